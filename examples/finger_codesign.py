@@ -241,7 +241,7 @@ def main():
     knots, logs = descend(alone, first_knots(), False, 6 if options.quick else 40)
     before = result(alone, knots, logs, not options.quick)
     print(f"control alone took {alone.rollouts} rollouts, {time.perf_counter() - begun:.0f} s", file=sys.stderr)
-    shaped = descend(together, knots, True, 3 if options.quick else 12)
+    shaped = descend(together, knots, True, 3 if options.quick else 25)
     # What the co-design went on for, the rival goes on for as well.
     more = descend(alone, knots, False, 3 if options.quick else 40)
     before = result(alone, *more, not options.quick)

@@ -301,7 +301,7 @@ fn study(quick: bool) -> hydrograd::Result<Report> {
         cost_tolerance: 1e-4,
         ..OptimizeSettings::default()
     };
-    let (short, long) = if quick { (3, 6) } else { (12, 40) };
+    let (short, long) = if quick { (3, 6) } else { (25, 40) };
     let unshaped = simulator(&[0.0; 2], COARSE, false)?;
     let mut counts = [0; 2];
     let mut alone = |start: &Design, iterations| {

@@ -301,7 +301,7 @@ fn study(quick: bool) -> hydrograd::Result<Report> {
         cost_tolerance: 1e-4,
         ..OptimizeSettings::default()
     };
-    let (short, long) = if quick { (3, 6) } else { (25, 40) };
+    let (short, long) = if quick { (6, 6) } else { (25, 40) };
     let unshaped = simulator(&[0.0; 2], COARSE, false)?;
     let mut counts = [0; 2];
     let mut alone = |start: &Design, iterations| {
@@ -364,13 +364,13 @@ fn plot(file: &Path, report: &Report) -> Result<(), Box<dyn Error>> {
         }
     }
     let halves = below.split_evenly((1, 2));
-    let courses: [(&str, f64, &dyn Fn(&Grip) -> Vec<f64>); 2] = [
-        ("opening left, %", 100.0, &|g| g.left.clone()),
-        ("coin moved, mm", 1e3, &|g| g.coin.clone()),
+    let courses = [
+        ("opening left, %", 100.0, own.map(|o| &o.0.left)),
+        ("coin moved, mm", 1e3, own.map(|o| &o.0.coin)),
     ];
-    for (half, (what, unit, of)) in halves.iter().zip(courses) {
-        let all = own.iter().flat_map(|o| of(o.0));
-        let (low, high) = all.fold((0.0, 0.0), |(l, h): (f64, f64), x| (l.min(x), h.max(x)));
+    for (half, (what, unit, both)) in halves.iter().zip(courses) {
+        let all = both.iter().flat_map(|course| course.iter());
+        let (low, high) = all.fold((0.0, 0.0), |(l, h): (f64, f64), x| (l.min(*x), h.max(*x)));
         let mut chart = ChartBuilder::on(half)
             .margin(10)
             .x_label_area_size(32)
@@ -385,8 +385,8 @@ fn plot(file: &Path, report: &Report) -> Result<(), Box<dyn Error>> {
             .y_desc(what)
             .light_line_style(TRANSPARENT)
             .draw()?;
-        for (grip, _, colour) in own {
-            let points = of(grip).into_iter().enumerate();
+        for (course, (_, _, colour)) in both.iter().zip(own) {
+            let points = course.iter().enumerate();
             let line = points.map(|(n, x)| (n as f64 * TIME_STEP, unit * x));
             chart.draw_series(LineSeries::new(line, colour))?;
         }
@@ -460,7 +460,7 @@ mod tests {
         let [forces, shape] = super::check().unwrap();
         assert!(forces < 1e-5 && shape < 0.1);
         let report = super::study(true).unwrap();
-        assert!(report.less_lateness > 0.05 && report.less_motion > 0.05);
+        assert!(report.less_lateness > 0.1 && report.less_motion > 0.2);
         let volume: f64 = report.together.size.iter().product();
         assert!((volume / super::SIZE.iter().product::<f64>() - 1.0).abs() < 1e-12);
     }

@@ -115,7 +115,7 @@ def seen(rollout, thickness):
     return late, z - z[0]
 
 
-def descend(grip, knots, shaped, iterations):
+def descend(grip, knots, shaped, iterations, tolerance=1e-4):
     """Knots and logarithms of the lowest cost."""
     from scipy.optimize import minimize
 
@@ -138,7 +138,7 @@ def descend(grip, knots, shaped, iterations):
     # Of length 1 like the logarithms.
     x = np.concatenate([knots / np.linalg.norm(knots), np.zeros(2 if shaped else 0)])
     bounds = [(None, None)] * KNOTS + [(-r, r) for r in REACH[: len(x) - KNOTS]]
-    options = {"maxiter": iterations, "maxfun": 2 * iterations, "ftol": 1e-4, "gtol": 1e-6}
+    options = {"maxiter": iterations, "maxfun": 2 * iterations, "ftol": tolerance, "gtol": 1e-6}
     minimize(cost, x, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
     x = best[1]
     return x[:KNOTS], x[KNOTS:] if shaped else np.zeros(2)
@@ -238,8 +238,7 @@ def main():
         sys.exit(0 if forces < 1e-5 and shape < 0.1 else 1)
     begun = time.perf_counter()
     alone, together = Grip(), Grip()
-    knots, logs = descend(alone, first_knots(), False, 6 if options.quick else 40)
-    before = result(alone, knots, logs, not options.quick)
+    knots, _ = descend(alone, first_knots(), False, 6 if options.quick else 40)
     print(f"control alone took {alone.rollouts} rollouts, {time.perf_counter() - begun:.0f} s", file=sys.stderr)
     shaped = descend(together, knots, True, 3 if options.quick else 25)
     # What the co-design went on for, the rival goes on for as well.

@@ -103,6 +103,38 @@ def test_system_id(tmp_path):
     assert 0.7 < fit["chi_squared"] < 1.3 and fit["correlation"] == pytest.approx(0.98, abs=0.01)
 
 
+def test_swimmer_codesign(tmp_path):
+    """Few iterations; the whole of it says 44 %."""
+    pytest.importorskip("scipy")
+    assert json.loads(said_by_check("swimmer_codesign"))["off"] < 1e-6
+    found = json.loads(run("swimmer_codesign", tmp_path, "--quick", "--json"))
+    before, after = found["alone"], found["together"]
+    assert found["gain"] > 0.2 and before["distance"] > 2.0 * found["start"] and after["work"] < before["work"]
+    for own in (before, after):
+        assert np.linalg.norm(own["torques"]) == pytest.approx(own["effort"])
+        # As heavy as ever.
+        assert np.dot(own["widths"], own["heights"]) == pytest.approx(3.0 / 180.0)
+
+
+def test_finger_codesign(tmp_path):
+    """Few iterations; the whole of it says 31 % and 41 %."""
+    pytest.importorskip("scipy")
+    off = json.loads(said_by_check("finger_codesign"))
+    assert off["forces"] < 1e-6 and off["shape"] < 0.02
+    found = json.loads(run("finger_codesign", tmp_path, "--quick", "--json"))
+    assert all(gain > 0.05 for gain in found["gains"].values())
+    for own in (found["alone"], found["together"]):
+        assert np.linalg.norm(own["forces"]) == pytest.approx(own["effort"])
+        assert np.prod(own["size"]) == pytest.approx(6e-4) and own["size"][0] > 0.0599
+
+
+def said_by_check(name):
+    command = [sys.executable, ROOT / f"examples/{name}.py", "--check", "--json"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_rov(tmp_path):
     """Once it has learnt the current, MPC holds the vehicle as well as tuned PIDs and arrives sooner; without, it stays off."""
     found = json.loads(run("rov", tmp_path, "--quick", "--json"))

@@ -274,7 +274,10 @@ fn films_refuse_shape_parameters_where_they_act() {
         "{found} {alone}"
     );
     let error = told(1.02).unwrap_err().to_string();
-    assert!(error.contains("a film acts"), "{error}");
+    assert!(
+        error.contains("a film carries a gap") && error.contains("films"),
+        "{error}"
+    );
 }
 
 #[test]

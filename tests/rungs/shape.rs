@@ -30,7 +30,7 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::isolated::IsolatedLinearised::shape_vjp" => |c| check(&isolated(), c),
         "coupling::reduced::linearised::ReducedLinearised::shape_vjp" => |c| all(reduced().iter().map(|s| check(s, c))),
         "dynamics::shape::Linearisation::add_shape_vjp" => |c| rollouts(&[swimming()], c),
-        "dynamics::shape::Shapes::follow_vjp" => |c| rollouts(&[swimming()], c),
+        "dynamics::shapes::Shapes::follow_vjp" => |c| rollouts(&[swimming()], c),
         "dynamics::contact_shape::System::add_contact_shape_vjp" => |c| rollouts(&landing(), c),
         "coupling::response::ResponseLinearised::shape_vjp" => |c| all(alone().iter().map(|s| check(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::shape_vjp" => |c| check(&extrapolated(), c),

@@ -14,6 +14,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
+type Marks<'py> = Bound<'py, PyArray1<bool>>;
 type Shared = Arc<hydrograd::Rollout>;
 
 /// Bodies of sensors: one for all, or one each; None of what is fixed in the world.
@@ -94,6 +95,19 @@ fn go_on(interrupt: &Interrupt) -> hydrograd::Result<()> {
     }
 }
 
+/// The state and the points that `what` is asked for.
+fn asked(
+    what: &str,
+    rollout: &Shared,
+    state: isize,
+    points: &Bound<'_, PyAny>,
+) -> PyResult<(usize, Vec<Vec3>)> {
+    Ok((
+        array::numbered(state, rollout.states().len(), "state")?,
+        array::vectors(&format!("{what}: points"), points)?,
+    ))
+}
+
 /// Velocities at points at a state.
 pub fn flow<'py>(
     py: Python<'py>,
@@ -101,8 +115,7 @@ pub fn flow<'py>(
     state: isize,
     points: &Bound<'py, PyAny>,
 ) -> Numbers<'py> {
-    let at = array::numbered(state, rollout.states().len(), "state")?;
-    let points = array::vectors("flow: points", points)?;
+    let (at, points) = asked("flow", rollout, state, points)?;
     let inner = rollout.clone();
     let made = long(py, move |_| inner.flow(at, &points))?;
     vectors(py, &made)
@@ -115,8 +128,7 @@ pub fn flow_pressure<'py>(
     state: isize,
     points: &Bound<'py, PyAny>,
 ) -> Numbers<'py> {
-    let at = array::numbered(state, rollout.states().len(), "state")?;
-    let points = array::vectors("flow_pressure: points", points)?;
+    let (at, points) = asked("flow_pressure", rollout, state, points)?;
     let (inner, count) = (rollout.clone(), points.len());
     let made = long(py, move |_| inner.flow_pressure(at, &points))?;
     array::to_python(py, made, &[count])
@@ -128,12 +140,26 @@ pub fn flow_resolved<'py>(
     rollout: &Shared,
     state: isize,
     points: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let at = array::numbered(state, rollout.states().len(), "state")?;
-    let points = array::vectors("flow_resolved: points", points)?;
+) -> PyResult<Marks<'py>> {
+    let (at, points) = asked("flow_resolved", rollout, state, points)?;
     let inner = rollout.clone();
     let made = long(py, move |_| inner.flow_resolved(at, &points))?;
     Ok(PyArray1::from_vec(py, made))
+}
+
+/// Velocities at points at a state, zero where they aren't known, and whether they are.
+pub fn known_flow<'py>(
+    py: Python<'py>,
+    rollout: &Shared,
+    state: isize,
+    points: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Marks<'py>)> {
+    let (at, points) = asked("known_flow", rollout, state, points)?;
+    let inner = rollout.clone();
+    let made = long(py, move |_| inner.known_flow(at, &points))?;
+    let known = made.iter().map(Option::is_some).collect();
+    let velocities: Vec<Vec3> = made.iter().map(|u| u.unwrap_or_default()).collect();
+    Ok((vectors(py, &velocities)?, PyArray1::from_vec(py, known)))
 }
 
 /// The potential at points at a state.
@@ -143,8 +169,7 @@ pub fn potential<'py>(
     state: isize,
     points: &Bound<'py, PyAny>,
 ) -> Numbers<'py> {
-    let at = array::numbered(state, rollout.states().len(), "state")?;
-    let points = array::vectors("potential: points", points)?;
+    let (at, points) = asked("potential", rollout, state, points)?;
     let (inner, count) = (rollout.clone(), points.len());
     let made = long(py, move |_| inner.potential(at, &points))?;
     array::to_python(py, made, &[count])

@@ -398,15 +398,7 @@ impl Rollout {
         state: isize,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<bool>>)> {
-        let at = array::numbered(state, self.inner.states().len(), "state")?;
-        let points = array::vectors("known_flow: points", points)?;
-        let inner = self.inner.clone();
-        let made = long(py, move |_| inner.known_flow(at, &points))?;
-        let known = made.iter().map(Option::is_some).collect();
-        let values = made.iter().map(|u| u.unwrap_or_default());
-        let values = values.flat_map(|u| [u.x, u.y, u.z]).collect();
-        let velocities = array::to_python(py, values, &[made.len(), 3])?;
-        Ok((velocities, PyArray1::from_vec(py, known)))
+        flow::known_flow(py, &self.inner, state, points)
     }
 
     /// An observable at the states 0 … N by its name, (N + 1, …): "positions", "energy", "momentum", …; an unknown name's error has the list.

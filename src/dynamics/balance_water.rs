@@ -39,7 +39,7 @@ impl Linearisation<'_> {
             .iter()
             .map(|f| self.submerged_field(&f.virtual_twist));
         let tangents = (water.linearised).displaced(&direction, &virt.collect::<Vec<_>>())?;
-        if rows.by_parameters() {
+        if rows.by_parameters() && !self.system.shapes.water.is_empty() {
             let relative: Vec<Vec6> = fields[0].twist.iter().map(|t| self.relative(t)).collect();
             let through = (Some(&direction), relative.as_slice());
             for ((fields, carried), out) in fields.iter().zip(&carried).zip(out.iter_mut()) {

@@ -15,8 +15,8 @@ use super::slope::ShapeSlope;
 use super::views::FLUX;
 use crate::Result;
 use crate::adjoint::lie::{Mat3, Vec3, Vec6, angular};
-use crate::coupling::ShapeTerm;
 use crate::coupling::shape::filmed;
+use crate::coupling::{Direction, ShapeTerm};
 use nalgebra::{DMatrix, DVector};
 
 /// What comes in at the points of all bodies for one direction, and its rates along a displacement.
@@ -41,12 +41,21 @@ impl ReducedLinearised<'_> {
             return Err(filmed());
         }
         for term in terms {
-            let (x, y) = (self.respond(term.x), self.respond(term.y));
-            let alpha = [x.alpha.as_slice(), y.alpha.as_slice()];
-            let [from_x, from_y] = self.incoming(alpha, term.along);
+            // A direction with itself is asked for in every step: its exchange is summed once.
+            let responses: Vec<_> = (Direction::distinct(term.x, term.y).into_iter())
+                .map(|x| self.respond(x))
+                .collect();
+            let (x, y) = (&responses[0], &responses[responses.len() - 1]);
+            let incoming = match responses.len() {
+                1 => Vec::from(self.incoming([x.alpha.as_slice()], term.along)),
+                _ => {
+                    Vec::from(self.incoming([&x.alpha, &y.alpha].map(|a| a.as_slice()), term.along))
+                }
+            };
+            let (from_x, from_y) = (&incoming[0], &incoming[incoming.len() - 1]);
             for (out, (b, slope)) in out.iter_mut().zip(shapes) {
                 let twists = [&x.twists, &y.twists].map(|t| t.fixed_rows::<6>(6 * b).into_owned());
-                let found = self.contracted(*b, slope, &twists, [&from_x, &from_y]);
+                let found = self.contracted(*b, slope, &twists, [from_x, from_y]);
                 *out += term.weight * found[usize::from(term.along.is_some())];
             }
         }
@@ -84,23 +93,27 @@ impl ReducedLinearised<'_> {
         out
     }
 
-    /// Of both directions; rates are zero without a displacement.
-    fn incoming(&self, alpha: [&[f64]; 2], along: Option<&[Vec6]>) -> [Incoming; 2] {
-        let count = alpha[0].len();
-        let (mut rates, mut moved) = (DMatrix::zeros(count, 2), None);
+    /// Of one or two directions; rates are zero without a displacement.
+    fn incoming<const N: usize>(
+        &self,
+        alpha: [&[f64]; N],
+        along: Option<&[Vec6]>,
+    ) -> [Incoming; N] {
+        let count = self.reduced.point_count();
+        let (mut rates, mut moved) = (DMatrix::zeros(count, N), None);
         if let Some(z) = along {
             let (psi, kept) = self.tangent_potentials(&alpha, z, &self.films.along(z));
             rates = self.tangent_solution(&psi).0;
             moved = Some(kept);
         }
         let none = (Vec3::zeros(), [0.0; 2]);
-        let mut seen = vec![[(none.1, [none.0; 2]); 2]; count];
+        let mut seen = vec![[(none.1, [none.0; 2]); N]; count];
         let charge = |k: usize, i: usize| [alpha[k][i], rates[(i, k)]];
         for (n, placed) in self.placed.iter().enumerate() {
             let moved = moved.as_ref().map(|m| &m[n].0);
             self.exchange(placed, moved, charge, &mut seen);
         }
-        [0, 1].map(|k| Incoming {
+        std::array::from_fn(|k| Incoming {
             charge: (0..count).map(|i| charge(k, i)).collect(),
             potential: seen.iter().map(|s| s[k].0).collect(),
             gradient: seen.iter().map(|s| s[k].1).collect(),
@@ -108,12 +121,12 @@ impl ReducedLinearised<'_> {
     }
 
     /// Adds what the two ends of a link send to each other.
-    fn exchange(
+    fn exchange<const N: usize>(
         &self,
         placed: &PlacedSkeletons,
         moved: Option<&Moved>,
         charge: impl Fn(usize, usize) -> [f64; 2],
-        seen: &mut [[([f64; 2], [Vec3; 2]); 2]],
+        seen: &mut [[([f64; 2], [Vec3; 2]); N]],
     ) {
         let link = placed.link;
         let (t, s) = (self.range(link.target), self.range(link.source));
@@ -133,7 +146,7 @@ impl ReducedLinearised<'_> {
         let targets = &self.reduced.bodies[link.target].parts().points;
         for (j, y) in placed.pair.positions.iter().enumerate() {
             let d = moved.map_or(Vec3::zeros(), |m| m.points[j]);
-            let mut back = [([0.0; 2], [Vec3::zeros(); 2]); 2];
+            let mut back = [([0.0; 2], [Vec3::zeros(); 2]); N];
             for (i, x) in targets.iter().enumerate() {
                 let apart = x - y;
                 let inverse = 1.0 / apart.norm();
@@ -143,7 +156,7 @@ impl ReducedLinearised<'_> {
                     -apart * cube,
                     d * cube - apart * (3.0 * cube * inverse * inverse * along),
                 ];
-                for k in 0..2 {
+                for k in 0..N {
                     if wanted[0] {
                         let at = &mut seen[t.start + i][k];
                         add(at, charge(k, s.start + j), &value, &gradient, weights, 1.0);

@@ -9,6 +9,7 @@ pub mod drag;
 mod draw;
 pub mod kernel;
 pub mod lie;
+pub mod multipole;
 mod registry;
 pub mod revolve;
 pub mod rigid;

@@ -232,6 +232,7 @@ pub(crate) fn assemble(
     let mut water = water::prepare(
         scene,
         &choices.water,
+        !choices.integrator.solves_contact(),
         in_water,
         &poses,
         clearance,

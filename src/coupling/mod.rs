@@ -26,6 +26,7 @@ mod pair;
 pub mod panel;
 pub mod reduced;
 mod response;
+pub mod scattering;
 mod settings;
 mod shape;
 mod surface;
@@ -73,6 +74,11 @@ pub trait Coupling: Send + Sync {
     /// The added mass of each body at unit density (body frame, about its origin) where none feels another: M̄_f is block diagonal and no pose changes it, so that
     /// nobody need ask for its products with a basis. `None` where bodies feel each other or a wall.
     fn apart(&self) -> Option<&[Mat6]> {
+        None
+    }
+
+    /// The coupling of so many bodies that no matrix of them is formed, of which answers to single directions are asked; `None` of others.
+    fn scattering(&self) -> Option<&scattering::Scattering> {
         None
     }
 
@@ -250,7 +256,7 @@ pub struct Tangent {
 
 /// One evaluation at given poses with the key to the derivatives there.
 pub trait Linearised: Send + Sync {
-    /// M̄_f times the basis: body-frame impulses, 6·bodies × k.
+    /// M̄_f times the basis: body-frame impulses, 6·bodies × k; 0 × 0 where a coupling that forms no matrix was placed without a basis.
     fn momenta(&self) -> &DMatrix<f64>;
 
     /// ∇_g E(x, y) for coefficients on the basis, without a further solve: a spatial wrench on each

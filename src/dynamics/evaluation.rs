@@ -73,6 +73,11 @@ impl System {
         let kinematics = self.kinematics(q)?;
         let (fluid, report) = match self.fluid_apart(self.in_water(parameters)) {
             Some(fluid) => (fluid, CouplingReport::default()),
+            None if self.coupling.scattering().is_some() => {
+                let placed = self.fluid_scattered(&kinematics)?;
+                let fluid = placed.map_or(FluidMomenta::Still, FluidMomenta::Scattered);
+                (fluid, CouplingReport::default())
+            }
             None => {
                 let basis = self.basis(&kinematics);
                 let solved = self.coupling.evaluate(&basis.poses, &basis.twists)?;

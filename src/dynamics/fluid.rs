@@ -1,9 +1,13 @@
 //! Momenta of the water that moves with the bodies, as linear maps of what moves it.
 
 use super::System;
+use super::recoil::TreeMotions;
+use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
+use crate::coupling::scattering::Scattered;
 use crate::multibody::Kinematics;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Spatial momenta of all bodies at unit density for coefficients on the basis on which the water is solved: a generalised velocity each, and the current's if there is
 /// one.
@@ -16,6 +20,8 @@ pub(super) enum FluidMomenta<'a> {
     Apart(&'a [Mat6]),
     /// Per basis column, 6 × k a body.
     Coupled(Vec<DMatrix<f64>>),
+    /// Bodies so many that single directions are solved for as they are asked for.
+    Scattered(Arc<Scattered<'a>>),
 }
 
 impl FluidMomenta<'_> {
@@ -40,6 +46,21 @@ impl FluidMomenta<'_> {
             Self::Coupled(columns) => (columns.iter())
                 .map(|m| (m * direction).fixed_rows::<6>(0).into_owned())
                 .collect(),
+            Self::Scattered(at) => {
+                let twists = at.motions().twists(direction);
+                in_world(system, kinematics, &at.impulses(&at.respond(&twists)))
+            }
+        }
+    }
+
+    /// Whether all that was solved for so far met its tolerance.
+    ///
+    /// # Errors
+    /// The first solve that didn't.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Scattered(at) => at.check(),
+            Self::Still | Self::Apart(_) | Self::Coupled(_) => Ok(()),
         }
     }
 
@@ -49,7 +70,7 @@ impl FluidMomenta<'_> {
             Self::Coupled(columns) => (columns.iter())
                 .map(|m| m.fixed_view::<6, 1>(0, k).into_owned())
                 .collect(),
-            Self::Still | Self::Apart(_) => {
+            Self::Still | Self::Apart(_) | Self::Scattered(_) => {
                 let columns = system.tree.velocities() + usize::from(system.has_current());
                 let unit = DVector::from_fn(columns, |i, _| f64::from(i == k));
                 self.along(system, kinematics, &unit)
@@ -79,8 +100,24 @@ impl FluidMomenta<'_> {
                 }
                 out
             }
+            // M̄_f is symmetric.
+            Self::Scattered(at) => {
+                let twists = system.submerged_twists(kinematics, field);
+                let momenta = in_world(system, kinematics, &at.impulses(&at.respond(&twists)));
+                system.tree.project(&kinematics.columns, momenta)
+            }
         }
     }
+}
+
+/// Body-frame impulses of the bodies in the water (stacked) as spatial momenta of all bodies.
+fn in_world(system: &System, kinematics: &Kinematics, impulses: &DVector<f64>) -> Vec<Vec6> {
+    let mut out = vec![Vec6::zeros(); system.len()];
+    for (b, w) in system.submerged() {
+        let h = impulses.fixed_rows::<6>(6 * w).into_owned();
+        out[b] = kinematics.poses[b].wrench_to_world(&h);
+    }
+    out
 }
 
 /// Spatial momenta of bodies that move through the water with spatial `twists` and don't feel each other.
@@ -105,6 +142,22 @@ impl System {
             false => Some(FluidMomenta::Still),
             true => self.coupling.apart().map(FluidMomenta::Apart),
         }
+    }
+
+    /// The water's momenta of bodies so many that single directions are solved for; none of others.
+    ///
+    /// # Errors
+    /// A coupling that fails.
+    pub(super) fn fluid_scattered(
+        &self,
+        kinematics: &Kinematics,
+    ) -> Result<Option<Arc<Scattered<'_>>>> {
+        let Some(many) = self.coupling.scattering() else {
+            return Ok(None);
+        };
+        let poses: Vec<_> = self.submerged().map(|(b, _)| kinematics.poses[b]).collect();
+        let motions = TreeMotions::new(self, kinematics.clone());
+        Ok(Some(Arc::new(many.place(&poses, Box::new(motions))?)))
     }
 
     /// The water's momenta from the body-frame impulses of the basis.

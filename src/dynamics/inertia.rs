@@ -1,6 +1,7 @@
 //! The mass matrix M(q) = M_r + ρ Jᵀ M̄_f J: its products, itself, and its factor.
 
-use super::fluid::FluidMomenta;
+use super::fluid::{self, FluidMomenta};
+use super::recoil::Recoiling;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
 use crate::adjoint::rigid;
@@ -14,14 +15,16 @@ const LEAST: f64 = 1e-13;
 
 /// The rows and columns of the mass matrix that forces decide, factored. Right-hand sides and solutions have an entry per velocity; those of driven ones aren't read,
 /// and zero.
-pub enum Inertia {
+pub enum Inertia<'a> {
     /// The matrix, and the velocities that are free.
     Dense(Definite, Vec<usize>),
     /// Where no body feels another.
     Articulated(Articulated),
+    /// Where so many do that no matrix is formed.
+    Recoiling(Recoiling<'a>),
 }
 
-impl Evaluation<'_> {
+impl<'a> Evaluation<'a> {
     /// M(q) v, user coordinates.
     pub fn mass_times(&self, v: &DVector<f64>) -> DVector<f64> {
         if let FluidMomenta::Coupled(_) = self.fluid {
@@ -46,7 +49,7 @@ impl Evaluation<'_> {
         self.mass_matrix.get_or_init(|| {
             let made = match self.fluid {
                 FluidMomenta::Coupled(_) => self.rigid_and_coupled(),
-                FluidMomenta::Apart(_) | FluidMomenta::Still => {
+                FluidMomenta::Apart(_) | FluidMomenta::Still | FluidMomenta::Scattered(_) => {
                     let islands = self.islands();
                     let changes = islands.changes();
                     let products: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
@@ -85,16 +88,69 @@ impl Evaluation<'_> {
     ///
     /// # Errors
     /// A mass matrix that isn't positive definite.
-    pub fn factored(&self, free: &[usize]) -> Result<Inertia> {
-        let added = match self.fluid {
+    pub fn factored(&self, free: &[usize]) -> Result<Inertia<'a>> {
+        let added = match &self.fluid {
             FluidMomenta::Coupled(_) => return self.factored_dense(free),
-            FluidMomenta::Apart(added) => Some(added),
+            FluidMomenta::Apart(added) => Some(*added),
             FluidMomenta::Still => None,
+            FluidMomenta::Scattered(at) => {
+                if self.system.tree.has_followers() {
+                    return self.factored_dense(free);
+                }
+                let own = self.articulated(free, Some(at.own()))?;
+                return Ok(Inertia::Recoiling(Recoiling::new(self, at, own)));
+            }
         };
         // Closed by a transmission, a tree isn't one any more.
         if self.system.tree.has_followers() {
             return self.factored_dense(free);
         }
+        self.articulated(free, added).map(Inertia::Articulated)
+    }
+
+    /// v with given velocities `driven` (zero where free) and the rows `free` of M v = `right`.
+    ///
+    /// # Errors
+    /// A mass matrix that isn't positive definite.
+    pub(crate) fn velocity(
+        &self,
+        free: &[usize],
+        mut right: DVector<f64>,
+        driven: &DVector<f64>,
+    ) -> Result<DVector<f64>> {
+        let factor = self.factored(free)?;
+        let moved = driven.iter().any(|x| *x != 0.0);
+        let v = match (&factor, &self.fluid) {
+            (Inertia::Recoiling(many), FluidMomenta::Scattered(at)) => {
+                if moved {
+                    right -= self.own_mass_times(at.own(), driven);
+                }
+                many.solve_beside(&right, driven)
+            }
+            _ => {
+                if moved {
+                    right -= self.mass_times(driven);
+                }
+                driven + factor.solve(&right)
+            }
+        };
+        self.fluid.check()?;
+        Ok(v)
+    }
+
+    /// M v of bodies with these added masses that don't feel each other.
+    fn own_mass_times(&self, added: &[Mat6], v: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let fluid = fluid::apart(added, self.system, &self.kinematics, &twists);
+        let momenta = self.with_rigid(&twists, &fluid);
+        let mut out = tree.project(&self.kinematics.columns, momenta);
+        (self.system.armature).add(self.parameters, v, &mut out);
+        out
+    }
+
+    /// The factor of bodies that don't feel each other.
+    fn articulated(&self, free: &[usize], added: Option<&[Mat6]>) -> Result<Articulated> {
         let mut inertias = self.rigid.clone();
         if let Some(added) = added {
             for (b, w) in self.system.submerged() {
@@ -109,16 +165,14 @@ impl Evaluation<'_> {
             added[i] = own;
         }
         let free = |i: usize| is_free[i].then_some(added[i]);
-        Articulated::new(tree, kinematics, &inertias, free, LEAST)
-            .map(Inertia::Articulated)
-            .map_err(|found| {
-                let name = &self.system.bodies[found.body].name;
-                let place = format!("mass matrix M(q), at the joint of body {name:?}");
-                unresolved(place, found.smallest)
-            })
+        Articulated::new(tree, kinematics, &inertias, free, LEAST).map_err(|found| {
+            let name = &self.system.bodies[found.body].name;
+            let place = format!("mass matrix M(q), at the joint of body {name:?}");
+            unresolved(place, found.smallest)
+        })
     }
 
-    fn factored_dense(&self, free: &[usize]) -> Result<Inertia> {
+    fn factored_dense(&self, free: &[usize]) -> Result<Inertia<'a>> {
         let block = self.mass_matrix().select_rows(free).select_columns(free);
         let smallest = smallest_scaled_eigenvalue(&block);
         let refused = || unresolved(self.weakest(free), smallest);
@@ -183,11 +237,12 @@ fn unresolved(place: String, smallest: f64) -> Error {
     }
 }
 
-impl Inertia {
+impl Inertia<'_> {
     /// v with M v = `right` on the free rows.
     pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         match self {
             Self::Articulated(tree) => tree.solve(right),
+            Self::Recoiling(many) => many.solve(right),
             Self::Dense(factor, free) => {
                 let found = factor.solve(&right.select_rows(free));
                 let mut out = DVector::zeros(right.len());
@@ -203,6 +258,13 @@ impl Inertia {
     pub fn solve_columns(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         match self {
             Self::Articulated(tree) => tree.solve_columns(right),
+            Self::Recoiling(many) => {
+                let mut out = right.clone();
+                for (mut out, right) in out.column_iter_mut().zip(right.column_iter()) {
+                    out.copy_from(&many.solve(&right.into_owned()));
+                }
+                out
+            }
             Self::Dense(factor, free) => {
                 let found = factor.solve_columns(&right.select_rows(free));
                 let mut out = DMatrix::zeros(right.nrows(), right.ncols());

@@ -15,7 +15,10 @@ impl Evaluation<'_> {
     pub(super) fn islands(&self) -> Islands {
         let (system, links) = (self.system, self.system.tree.links());
         let velocities = system.tree.velocities();
-        let coupled = matches!(self.fluid, FluidMomenta::Coupled(_));
+        let coupled = matches!(
+            self.fluid,
+            FluidMomenta::Coupled(_) | FluidMomenta::Scattered(_)
+        );
         let ties: Option<Vec<_>> = match coupled {
             true => None,
             false => system.smooth_forces().map(|f| f.ties()).collect(),

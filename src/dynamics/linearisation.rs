@@ -3,6 +3,7 @@
 use super::fluid::FluidMomenta;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::Vec6;
+use crate::coupling::scattering::ScatteredLinearised;
 use crate::coupling::{Linearise, Linearised};
 use crate::multibody::Kinematics;
 use crate::{Error, Result};
@@ -79,6 +80,12 @@ impl System {
             let none = DMatrix::zeros(6 * poses.len(), 0);
             let linearised = coupling.linearise(&poses, &none)?;
             return Ok(Water { linearised, fluid });
+        }
+        if let Some(placed) = self.fluid_scattered(kinematics)? {
+            return Ok(Water {
+                linearised: Box::new(ScatteredLinearised::of(placed.clone())),
+                fluid: FluidMomenta::Scattered(placed),
+            });
         }
         let basis = self.basis(kinematics);
         let linearised = coupling.linearise(&basis.poses, &basis.twists)?;

@@ -24,6 +24,7 @@ mod limit;
 mod linearisation;
 mod momentum;
 mod parameters;
+mod recoil;
 mod shape;
 mod shapes;
 mod slopes;

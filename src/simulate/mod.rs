@@ -82,6 +82,6 @@ pub use crate::policy::{
     SpeedStage, SpeedStages, Wave, WaveJoint,
 };
 pub use crate::water::{
-    AdapterName, Arithmetic, Backend, BackendReport, Carried, DeviceReport, Discretisation,
+    AdapterName, Arithmetic, Backend, BackendReport, Carried, DeviceReport, Discretisation, Exchange,
     ErrorEstimate, Fidelity, GapError, GpuSettings, Knob, Level, Method, Numerics, WaterChoices,
 };

@@ -5,7 +5,7 @@ use crate::boundary::{Depth, Readout, RowScaling};
 use crate::coupling::full::{FullSolver, Preconditioner};
 use crate::dynamics::Integrator;
 use crate::scene::{Preset, Scene};
-use crate::water::{Backend, Fidelity, GpuSettings, Method};
+use crate::water::{Backend, Exchange, Fidelity, GpuSettings, Method};
 use serde::{Deserialize, Serialize};
 
 /// Declares what may be asked for beside a preset, with its places in [`Choices`]: each a field, and a method that gives other
@@ -83,6 +83,8 @@ settings! {
     /// Whether the water in gaps that compressed bodies or panels don't resolve is added as films (fidelities `reduced`, `auto`, and `full` by panels; on
     /// unless turned off).
     films: bool => water.numerics.films;
+    /// How compressed bodies are coupled (fidelities `reduced` and `auto`): by a factor, or by products alone where they are many.
+    exchange: Exchange => water.numerics.exchange;
     /// Time integrator. `None`: the preset's; for a scene with contact, if that doesn't solve contact,
     /// [`Integrator::MomentumEuler`].
     integrator: Integrator => integrator;

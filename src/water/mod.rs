@@ -38,6 +38,7 @@ mod choices;
 mod clearance;
 mod device;
 mod estimate;
+mod exchange;
 mod fidelity;
 #[cfg(test)]
 mod film_limits;
@@ -58,6 +59,7 @@ pub use backend::{AdapterName, Arithmetic, Backend, BackendReport, DeviceReport,
 pub use choices::WaterChoices;
 pub(crate) use choices::surfaces;
 pub use estimate::{ErrorEstimate, Level};
+pub use exchange::Exchange;
 pub use fidelity::{Fidelity, Knob};
 pub use gap_error::{Carried, GapError};
 pub use method::Method;

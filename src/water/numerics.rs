@@ -1,5 +1,6 @@
 //! Numbers that methods and fidelities work with, and what is chosen for each body.
 
+use super::exchange::Exchange;
 use crate::boundary;
 use crate::coupling::full::SolveSettings;
 use crate::coupling::reduced::{Cutoff, compress};
@@ -19,6 +20,8 @@ pub struct Numerics {
     pub accuracy: f64,
     /// Whether the water in gaps that aren't resolved is a film, with the fidelities `reduced` and `auto`, and with `full` by panels.
     pub films: bool,
+    /// How compressed bodies are coupled.
+    pub exchange: Exchange,
 }
 
 impl Default for Numerics {
@@ -29,6 +32,7 @@ impl Default for Numerics {
             compress: compress::CompressSettings::default(),
             accuracy: 0.01,
             films: true,
+            exchange: Exchange::default(),
         }
     }
 }

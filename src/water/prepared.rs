@@ -56,13 +56,14 @@ const FILM_EDGES: f64 = 0.1;
 /// What the flow that compression leaves out is worth in the added mass.
 const LEFT_OUT: f64 = 0.012;
 
-/// Couples the bodies of a scene, which start at `poses` (all bodies of the scene).
+/// Couples the bodies of a scene, which start at `poses` (all bodies of the scene); `explicit` says that no integrator asks for the matrix of inertia.
 ///
 /// # Errors
 /// A device that can't be opened, bodies that the method or the fidelity can't take, or whatever the discretisation reports.
 pub(crate) fn prepare(
     scene: &Scene,
     choices: &WaterChoices,
+    explicit: bool,
     (numbers, submerged): (Vec<usize>, Vec<SubmergedBody>),
     poses: &[Pose],
     mut clearance: Clearance,
@@ -71,6 +72,16 @@ pub(crate) fn prepare(
 ) -> Result<Prepared> {
     let method = choices.method_used().kind();
     let mut problem = Problem::new(scene, &numbers, &submerged, method, &choices.numerics);
+    let number = |b: usize| numbers.iter().position(|w| *w == b);
+    let changes = changes.iter().filter_map(|c| Some((number(c.body)?, c)));
+    let changes: Vec<_> = changes.collect();
+    problem.changes = &changes;
+    let start: Vec<Pose> = numbers.iter().map(|b| poses[*b]).collect();
+    problem.start = &start;
+    let compressed = scene.fluid.density > 0.0 && choices.fidelity.kind().compresses();
+    let on_cpu = choices.backend == Backend::Cpu;
+    problem.products =
+        compressed && (choices.numerics.exchange).by_products(&problem, explicit, on_cpu)?;
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,
@@ -80,12 +91,9 @@ pub(crate) fn prepare(
         &numbers,
     )?;
     (problem.plan, problem.folder) = (&planned.plan, folder);
-    let number = |b: usize| numbers.iter().position(|w| *w == b);
-    let changes = changes.iter().filter_map(|c| Some((number(c.body)?, c)));
-    let changes: Vec<_> = changes.collect();
-    problem.changes = &changes;
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
-    clearance.films = choices.numerics.films && fidelity.kind().compresses();
+    clearance.films =
+        choices.numerics.films && fidelity.kind().compresses() && !problem.products;
     clearance.resolved_edges = match (clearance.films, fidelity.kind().compresses()) {
         (true, _) => FILM_EDGES,
         // What compressed bodies resolve isn't a matter of edges.

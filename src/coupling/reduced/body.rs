@@ -174,7 +174,7 @@ impl ReducedBody {
     }
 
     /// [L, Ū], points × (modes + 6).
-    pub(super) fn basis(&self) -> &DMatrix<f64> {
+    pub(in crate::coupling) fn basis(&self) -> &DMatrix<f64> {
         &self.basis
     }
 

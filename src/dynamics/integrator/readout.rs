@@ -9,12 +9,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// v with driven entries given and free ones from momentum p̂.
 pub(super) fn solve(e: &Evaluation, split: &Split, hat: &DVector<f64>) -> Result<DVector<f64>> {
-    let factor = e.factored(&split.free)?;
-    let mut right = e.user_momentum(hat) - &e.rest_momentum;
-    if split.driven.iter().any(|x| *x != 0.0) {
-        right -= e.mass_times(&split.driven);
-    }
-    Ok(&split.driven + factor.solve(&right))
+    let right = e.user_momentum(hat) - &e.rest_momentum;
+    e.velocity(&split.free, right, &split.driven)
 }
 
 /// Tangents of [`solve`] along those of q, p̂ and the parameters, from the derivatives of M v + p_rest: M dv = Xᵀ dp̂ + d(Xᵀ) p̂ − d(M v + p_rest).

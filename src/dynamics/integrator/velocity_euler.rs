@@ -13,7 +13,7 @@ use nalgebra::DVector;
 
 /// Acceleration, with the factored mass matrix of free velocities: driven joints reach their new velocity within the step, the
 /// others follow Eq. 3.
-fn acceleration(start: &Start) -> Result<(DVector<f64>, Inertia)> {
+fn acceleration<'a>(start: &Start<'_, 'a>) -> Result<(DVector<f64>, Inertia<'a>)> {
     let (s, e, split, v) = (start.stepper, start.e, start.split, start.v);
     let mut driven = (&split.driven - v) / s.dt;
     for &i in &split.free {
@@ -35,15 +35,15 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
 }
 
 /// What the derivatives of a step need.
-pub(super) struct Adjoint<'s> {
+pub(super) struct Adjoint<'s, 'a> {
     contact: contact::Adjoint<'s>,
     acceleration: DVector<f64>,
     /// Of the mass matrix of free velocities.
-    factor: Inertia,
+    factor: Inertia<'a>,
 }
 
-impl<'s> Adjoint<'s> {
-    pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
+impl<'s, 'a> Adjoint<'s, 'a> {
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (acceleration, factor) = acceleration(start)?;
         Ok(Self {
             contact: contact::Adjoint::new(start, velocities)?,
@@ -53,7 +53,7 @@ impl<'s> Adjoint<'s> {
     }
 }
 
-impl<'a> StepDerivatives<'a> for Adjoint<'_> {
+impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
     fn jvp(&self, start: &Start<'_, 'a>, along: &StepTangents) -> Result<StateTangents> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let (q, inputs) = (along.q, along.inputs);

@@ -138,7 +138,9 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             "body {:?} resolves gaps from {gap:.3e} m on (half that to a wall)",
             body.name
         ));
-        for (a, other) in bodies.iter().enumerate().take(b + 1) {
+        // Pairs far apart are no work of their own there.
+        let pairs = if problem.products { 0 } else { b + 1 };
+        for (a, other) in bodies.iter().enumerate().take(pairs) {
             if a == b && walls.is_empty() {
                 continue;
             }

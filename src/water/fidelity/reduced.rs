@@ -7,6 +7,7 @@ use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, Region, ShapeSlope, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
+use crate::water::exchange;
 use crate::water::gap_error::Carried;
 use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::numerics::Numerics;
@@ -33,26 +34,12 @@ impl FidelityKind for Reduced {
     }
 
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
-        let (coupling, unkept) = compressed(problem)?;
-        let (bodies, made) = (problem.bodies, coupling.reduced_bodies());
-        let mut as_made = Vec::with_capacity(made.len());
-        for (m, body) in made.iter().zip(bodies) {
-            let fit = &m.parts().fit;
-            as_made.push(Discretisation {
-                method: problem.method_for(body)?.label(),
-                faces: body.mesh.map_or(0, |m| m.faces().len()),
-                unknowns: m.modes(),
-                points: m.points(),
-                resolved_gap: Some(fit.resolved_gap),
-                resolved_regions: fit.regions.clone(),
-                asymmetry: fit.body_asymmetry,
-                added_mass_error: fit.body_error,
-                radiated_error: fit.radiated,
-                scattered_error: fit.scattered,
-                ..Discretisation::default()
-            });
+        if problem.products {
+            return many(problem);
         }
-        let slopes = shape_slopes(problem, made)?;
+        let (coupling, unkept) = compressed(problem)?;
+        let as_made = as_made(problem, coupling.reduced_bodies())?;
+        let slopes = shape_slopes(problem, coupling.reduced_bodies())?;
         let own_rates = slopes
             .iter()
             .map(|(b, slope)| (*b, slope.added_mass))
@@ -86,25 +73,79 @@ impl FidelityKind for Reduced {
     }
 }
 
+/// What each body became.
+fn as_made(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<Discretisation>> {
+    let each = made.iter().zip(problem.bodies);
+    let of = |(m, body): (&Arc<ReducedBody>, &SubmergedBody)| {
+        let fit = &m.parts().fit;
+        Ok(Discretisation {
+            method: problem.method_for(body)?.label(),
+            faces: body.mesh.map_or(0, |m| m.faces().len()),
+            unknowns: m.modes(),
+            points: m.points(),
+            resolved_gap: Some(fit.resolved_gap),
+            resolved_regions: fit.regions.clone(),
+            asymmetry: fit.body_asymmetry,
+            added_mass_error: fit.body_error,
+            radiated_error: fit.radiated,
+            scattered_error: fit.scattered,
+            ..Discretisation::default()
+        })
+    };
+    each.map(of).collect()
+}
+
+/// All bodies coupled by products.
+fn many(problem: &Problem) -> Result<Made> {
+    let (made, unkept) = compressed_bodies(problem)?;
+    Ok(Made {
+        own: problem.own(|b| Ok(made[b].parts().added_mass))?,
+        own_rates: Vec::new(),
+        carried: Some(Carried::Sources),
+        films: Vec::new(),
+        warnings: [warnings(problem, &made), unkept].concat(),
+        bodies: problem.named(as_made(problem, &made)?),
+        coupling: Box::new(exchange::scattering(problem, made)?),
+    })
+}
+
 /// All bodies compressed and coupled.
 pub(in crate::water) fn compressed_all(problem: &Problem) -> Result<reduced::Reduced> {
     Ok(compressed(problem)?.0)
 }
 
-/// The same, with what the user should know of bodies that couldn't be kept.
-fn compressed(problem: &Problem) -> Result<(reduced::Reduced, Vec<String>)> {
-    let (bodies, plan) = (problem.bodies, problem.plan);
+/// The bodies compressed, with what the user should know of those that couldn't be kept.
+fn compressed_bodies(problem: &Problem) -> Result<(Vec<Arc<ReducedBody>>, Vec<String>)> {
+    let bodies = problem.bodies;
     let mut made: Vec<Arc<ReducedBody>> = Vec::with_capacity(bodies.len());
     let mut unkept: Vec<String> = Vec::new();
+    // The first of each kind.
+    let mut kinds: Vec<usize> = Vec::new();
     for (b, body) in bodies.iter().enumerate() {
+        let same = |a: &&usize| {
+            let equal = problem.chosen(**a) == problem.chosen(b);
+            equal && bodies[**a].equal(body)
+        };
+        if let Some(a) = kinds.iter().find(same) {
+            made.push(made[*a].clone());
+            continue;
+        }
         let method = problem.method_for(body)?;
         let (body, warning) = compressed_body(problem, body, method, problem.chosen(b))?;
         made.push(body);
+        kinds.push(b);
         // One folder, one reason.
         if unkept.is_empty() {
             unkept.extend(warning);
         }
     }
+    Ok((made, unkept))
+}
+
+/// The bodies coupled by a factor, with what the user should know of those that couldn't be kept.
+fn compressed(problem: &Problem) -> Result<(reduced::Reduced, Vec<String>)> {
+    let (bodies, plan) = (problem.bodies, problem.plan);
+    let (made, unkept) = compressed_bodies(problem)?;
     let cutoff = |a: usize, b: usize| {
         let pair = (a.min(b), a.max(b));
         let found = plan.cutoffs.iter().find(|(p, _)| *p == pair);

@@ -1,7 +1,7 @@
 //! What a body method must answer.
 
 use crate::Result;
-use crate::adjoint::lie::Mat6;
+use crate::adjoint::lie::{Mat6, Pose};
 use crate::boundary::Response;
 use crate::coupling::Exclusions;
 use crate::coupling::reduced::compress::CompressSettings;
@@ -120,6 +120,10 @@ pub(crate) struct Problem<'a> {
     pub method: &'static dyn BodyMethod,
     pub numerics: &'a Numerics,
     pub plan: &'a Plan,
+    /// Where the bodies start.
+    pub start: &'a [Pose],
+    /// Whether they are coupled by products alone.
+    pub products: bool,
     /// Where compressed bodies are kept.
     pub folder: Option<&'a Path>,
     /// Shape parameters, each of a body by its number in the water.
@@ -145,6 +149,8 @@ impl<'a> Problem<'a> {
             method,
             numerics,
             plan: &NO_PLAN,
+            start: &[],
+            products: false,
             folder: None,
             changes: &[],
         }

@@ -1,0 +1,67 @@
+//! Moments of charges about a centre, and moved to another.
+
+use super::{Number, Table};
+
+/// The monomials aᵏ/k!, moments of a unit charge at `a` from the centre.
+pub fn monomials<T: Number>(table: &Table, a: &[T; 3], out: &mut [T]) {
+    out[0] = T::from(1.0);
+    for (k, lower) in table.monomial.iter().enumerate().take(table.moments()).skip(1) {
+        out[k] = out[lower.at] * a[lower.axis] * lower.factor;
+    }
+}
+
+/// Adds the moments Σ α aᵏ/k! of a charge whose monomials these are.
+pub fn add_moments<T: Number>(monomials: &[T], charge: T, out: &mut [T]) {
+    for (out, m) in out.iter_mut().zip(monomials) {
+        *out += *m * charge;
+    }
+}
+
+/// The potential at a place with these monomials, from the coefficients about the centre.
+pub fn potential<T: Number>(monomials: &[T], local: &[T]) -> T {
+    (monomials.iter().zip(local)).fold(T::from(0.0), |sum, (m, l)| sum + *m * *l)
+}
+
+/// Its gradient in the place.
+pub fn potential_gradient<T: Number>(table: &Table, monomials: &[T], local: &[T]) -> [T; 3] {
+    let mut out = [T::from(0.0); 3];
+    for (k, l) in local.iter().enumerate() {
+        for (out, lower) in out.iter_mut().zip(&table.lower[k]) {
+            if let Some(at) = lower {
+                *out += *l * monomials[*at as usize];
+            }
+        }
+    }
+    out
+}
+
+/// Adds moments about a centre to those about another, from which it is a shift with these `monomials` away.
+pub fn shift<T: Number>(table: &Table, monomials: &[T], from: &[T], out: &mut [T]) {
+    // M'ₖ₊ₗ += Mₖ sˡ/l!
+    for (m, sums) in from.iter().zip(&table.sums) {
+        for (s, at) in monomials.iter().zip(sums) {
+            out[*at as usize] += *m * *s;
+        }
+    }
+}
+
+/// Transpose of [`shift`] in the moments: adds coefficients about the other centre, `bar`, to those about the first.
+pub fn shift_back<T: Number>(table: &Table, monomials: &[T], bar: &[T], out: &mut [T]) {
+    for (out, sums) in out.iter_mut().zip(&table.sums) {
+        for (s, at) in monomials.iter().zip(sums) {
+            *out += bar[*at as usize] * *s;
+        }
+    }
+}
+
+/// The gradient in the shift of the moments' product with `bar`.
+pub fn shift_gradient<T: Number>(table: &Table, monomials: &[T], from: &[T], bar: &[T]) -> [T; 3] {
+    // The product is Σₗ cₗ sˡ/l!.
+    let mut local = vec![T::from(0.0); from.len()];
+    for (m, sums) in from.iter().zip(&table.sums) {
+        for (c, at) in local.iter_mut().zip(sums) {
+            *c += *m * bar[*at as usize];
+        }
+    }
+    potential_gradient(table, monomials, &local)
+}

@@ -1,0 +1,102 @@
+//! A tree of the bodies by their places.
+
+use crate::adjoint::lie::Vec3;
+
+/// Bodies that lie together.
+#[derive(Clone, Debug)]
+pub(super) struct Cell {
+    /// Its halves; none of a single body.
+    pub halves: Option<[usize; 2]>,
+    /// The cell that it is half of; its own number at the root.
+    pub parent: usize,
+    /// Its bodies, a range of [`Cells::order`].
+    pub first: usize,
+    pub count: usize,
+}
+
+/// Cells, each before its halves. Which bodies lie in which is decided once, from where they are at the start, so that the energy stays a smooth function of their places
+/// as these change.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    pub cells: Vec<Cell>,
+    pub order: Vec<usize>,
+    /// The cell of each body alone.
+    pub leaf: Vec<usize>,
+}
+
+impl Cells {
+    /// Of bodies about these centres, halved across the longest side.
+    pub fn new(centres: &[Vec3]) -> Self {
+        let mut out = Self {
+            cells: Vec::with_capacity(2 * centres.len()),
+            order: (0..centres.len()).collect(),
+            leaf: vec![0; centres.len()],
+        };
+        if !centres.is_empty() {
+            let mut waiting = vec![(0, centres.len(), 0)];
+            while let Some((first, count, parent)) = waiting.pop() {
+                out.add(centres, first, count, parent, &mut waiting);
+            }
+        }
+        out
+    }
+
+    fn add(
+        &mut self,
+        centres: &[Vec3],
+        first: usize,
+        count: usize,
+        parent: usize,
+        waiting: &mut Vec<(usize, usize, usize)>,
+    ) {
+        let own = self.cells.len();
+        // Its parent learns of it: the left half is made right after it.
+        if own > 0 {
+            let halves = &mut self.cells[parent].halves;
+            *halves = Some(match *halves {
+                None => [own, own],
+                Some([left, _]) => [left, own],
+            });
+        }
+        self.cells.push(Cell {
+            halves: None,
+            parent,
+            first,
+            count,
+        });
+        let bodies = &mut self.order[first..first + count];
+        if let [b] = bodies {
+            self.leaf[*b] = own;
+            return;
+        }
+        let mut low = Vec3::repeat(f64::INFINITY);
+        let mut high = -low;
+        for b in bodies.iter() {
+            low = low.inf(&centres[*b]);
+            high = high.sup(&centres[*b]);
+        }
+        let axis = (high - low).imax();
+        bodies.sort_by(|a, b| {
+            let places = centres[*a][axis].total_cmp(&centres[*b][axis]);
+            places.then(a.cmp(b))
+        });
+        let half = count / 2;
+        waiting.push((first + half, count - half, own));
+        waiting.push((first, half, own));
+    }
+
+    /// The cells that a body lies in.
+    pub fn around(&self, b: usize) -> Vec<usize> {
+        let mut out = vec![self.leaf[b]];
+        while let Some(last) = out.last().copied().filter(|i| *i != 0) {
+            out.push(self.cells[last].parent);
+        }
+        out
+    }
+
+    /// The bodies of a cell.
+    pub fn bodies(&self, cell: usize) -> &[usize] {
+        let Cell { first, count, .. } = self.cells[cell];
+        &self.order[first..first + count]
+    }
+}

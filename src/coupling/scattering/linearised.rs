@@ -1,0 +1,210 @@
+//! Derivatives of the energy of many bodies: of directions that are given by coefficients or by twists.
+
+use super::Scattering;
+use super::scattered::{Answer, Motions, Scattered};
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::coupling::{
+    Coupling, CouplingReport, Direction, Linearised, Momenta, Pullback, Tangent,
+};
+use crate::{Error, Result};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+const FLUX: f64 = 4.0 * PI;
+
+/// Columns of a dense basis.
+struct Dense(DMatrix<f64>);
+
+impl Motions for Dense {
+    fn twists(&self, coefficients: &DVector<f64>) -> DVector<f64> {
+        &self.0 * coefficients
+    }
+
+    fn transposed(&self, impulses: &DVector<f64>) -> DVector<f64> {
+        self.0.tr_mul(impulses)
+    }
+}
+
+/// [`Scattered`] with its derivatives; impulses of a basis are formed where one was given alone.
+pub struct ScatteredLinearised<'a> {
+    at: Arc<Scattered<'a>>,
+    momenta: DMatrix<f64>,
+    report: CouplingReport,
+}
+
+impl<'a> ScatteredLinearised<'a> {
+    /// Of what is placed already. No basis's impulses are formed.
+    pub fn of(at: Arc<Scattered<'a>>) -> Self {
+        Self {
+            at,
+            momenta: DMatrix::zeros(0, 0),
+            report: CouplingReport::default(),
+        }
+    }
+
+    fn dense(model: &'a Scattering, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
+        let at = model.place(poses, Box::new(Dense(basis.clone())))?;
+        let mut momenta = DMatrix::zeros(basis.nrows(), basis.ncols());
+        for (k, mut out) in momenta.column_iter_mut().enumerate() {
+            let answer = at.respond(&basis.column(k).into_owned());
+            out.copy_from(&at.impulses(&answer));
+        }
+        at.check()?;
+        if let Some(bad) = momenta.iter().find(|x| !x.is_finite()) {
+            return Err(Error::Unresolved {
+                place: "exchange between many bodies".into(),
+                quantity: "impulse".into(),
+                value: *bad,
+                limit: f64::MAX,
+                remedy: "points of two bodies coincide: bodies overlap".into(),
+            });
+        }
+        Ok(Self {
+            report: at.report(),
+            at: Arc::new(at),
+            momenta,
+        })
+    }
+
+    fn respond(&self, x: &Direction) -> Arc<Answer> {
+        match x {
+            Direction::Basis(c) => self.at.respond(&self.at.motions.twists(c)),
+            Direction::Twist(x) => self.at.respond(x),
+        }
+    }
+
+    /// The rate of the impulses to charges as bodies are displaced.
+    fn impulse_rate(&self, charges: &[f64], z: &[Vec6]) -> DVector<f64> {
+        let at = &self.at;
+        let places = at.moving(z);
+        let mut seen = at.tangent_potentials(&places, charges);
+        let answered = at.answering(&seen);
+        let further = at.potentials(&answered);
+        seen.iter_mut().zip(further).for_each(|(x, y)| *x += y);
+        at.impulses_of(&seen)
+    }
+}
+
+/// Rates of the impulses, wrenches and their rates, of one direction's charges with themselves.
+struct Bent {
+    impulses: DVector<f64>,
+    gradient: Vec<Vec6>,
+    rate: Vec<Vec6>,
+}
+
+impl Linearised for ScatteredLinearised<'_> {
+    fn momenta(&self) -> &DMatrix<f64> {
+        &self.momenta
+    }
+
+    fn gradient(&self, x: &DVector<f64>, y: &DVector<f64>) -> Result<Vec<Vec6>> {
+        let (a, b) = (
+            self.respond(&Direction::Basis(x)),
+            self.respond(&Direction::Basis(y)),
+        );
+        let out = self.at.pull_back(&a.charges, &b.charges);
+        self.at.check()?;
+        Ok(out)
+    }
+
+    fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
+        let answer = self.respond(&Direction::Basis(y));
+        let rate = self.impulse_rate(&answer.charges, z);
+        self.at.check()?;
+        Ok(self.at.motions.transposed(&rate))
+    }
+
+    fn vjp(&self, x: Direction, y: Direction) -> Result<Pullback> {
+        let (x, y) = (self.respond(&x), self.respond(&y));
+        let out = Pullback {
+            momentum_x: self.at.impulses(&x),
+            momentum_y: self.at.impulses(&y),
+            wrench: self.at.pull_back(&x.charges, &y.charges),
+        };
+        self.at.check()?;
+        Ok(out)
+    }
+
+    fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
+        let at = &self.at;
+        let places = at.moving(z);
+        let bent = |charges: &[f64]| {
+            let seen = at.tangent_potentials(&places, charges);
+            let rates = at.answering(&seen);
+            let found = at.gradient_jvp(&places, charges, &rates);
+            let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
+            let [gradient, rate] = found.wrenches_and_rates();
+            let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
+            Bent {
+                impulses: at.impulses_of(&seen),
+                gradient: scaled(gradient),
+                rate: scaled(rate),
+            }
+        };
+        let (x, y) = (self.respond(&x), self.respond(&y));
+        let out = if x.charges == y.charges {
+            let bent = bent(&x.charges);
+            Tangent {
+                momentum_x: bent.impulses.clone(),
+                momentum_y: bent.impulses,
+                gradient: bent.gradient,
+                wrench: bent.rate,
+            }
+        } else {
+            let combined = |sign: f64| -> Vec<f64> {
+                let each = x.charges.iter().zip(&y.charges);
+                each.map(|(x, y)| x + sign * y).collect()
+            };
+            let (sum, difference) = (bent(&combined(1.0)), bent(&combined(-1.0)));
+            let quarter = |a: &[Vec6], b: &[Vec6]| -> Vec<Vec6> {
+                a.iter().zip(b).map(|(a, b)| 0.25 * (a - b)).collect()
+            };
+            Tangent {
+                momentum_x: 0.5 * (&sum.impulses + &difference.impulses),
+                momentum_y: 0.5 * (&sum.impulses - &difference.impulses),
+                gradient: quarter(&sum.gradient, &difference.gradient),
+                wrench: quarter(&sum.rate, &difference.rate),
+            }
+        };
+        at.check()?;
+        Ok(out)
+    }
+
+    fn report(&self) -> &CouplingReport {
+        &self.report
+    }
+}
+
+impl Coupling for Scattering {
+    fn name(&self) -> &'static str {
+        "the fidelity reduced, for many bodies"
+    }
+
+    fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    fn unknowns(&self) -> usize {
+        self.mode_count()
+    }
+
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        let found = ScatteredLinearised::dense(self, poses, basis)?;
+        Ok(Momenta::new(found.momenta, found.report))
+    }
+
+    fn differentiable(&self) -> Option<&dyn crate::coupling::Linearise> {
+        Some(self)
+    }
+
+    fn scattering(&self) -> Option<&Scattering> {
+        Some(self)
+    }
+}
+
+impl crate::coupling::Linearise for Scattering {
+    fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        Ok(Box::new(ScatteredLinearised::dense(self, poses, basis)?))
+    }
+}

@@ -1,0 +1,165 @@
+//! Compressed bodies so many that no matrix of them all is formed: the exchange between them is summed where it is used, near ones point by point, groups of
+//! others by moments about their centres, groups of groups the farther they are.
+//!
+//! The same energy as [`Reduced`](super::reduced), whose G is replaced by Ĝ, symmetric and a smooth function of the poses:
+//!
+//! ```text
+//! α = Ū x̄ + L a,   a = Lᵀ Ĝ α            by GMRES: I − LᵀĜL is near the identity while bodies are apart
+//! M̄ x̄ = M̄₀ x̄ + 4π Ūᵀ Ĝ α
+//! ```
+//!
+//! Where momenta are given instead of twists, the twists are eliminated with them (recoil, [`Scattered::recoil`]): with what the bodies' own inertias answer to
+//! impulses, `x̄ = x̄₀ − T(4π Ūᵀ Ĝ α)`, it is still one system with one right-hand side,
+//!
+//! ```text
+//! (I − Ŝ Ĝ) α = Ū x̄₀,   Ŝ = L Lᵀ − 4π Ū T Ūᵀ
+//! ```
+//!
+//! whose M̄ is never formed. The energy's gradient is a Coulomb sum of the charges, its derivatives those of the same sums in dual numbers.
+
+mod cells;
+mod levels;
+mod linearised;
+mod pairs;
+mod places;
+mod scattered;
+mod sums;
+
+pub use levels::Levels;
+pub use linearised::ScatteredLinearised;
+pub use pairs::Apart;
+pub use scattered::{Answer, Motions, Recoiled, Scattered};
+
+use super::Exclusions;
+use super::reduced::{Link, Reduced, ReducedBody};
+use super::settings::{end, ranges};
+use crate::adjoint::lie::{Mat6, Pose};
+use crate::adjoint::multipole::Table;
+use crate::{Error, Result};
+use cells::Cells;
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Compressed bodies that are coupled by products alone.
+#[derive(Clone)]
+pub struct Scattering {
+    bodies: Vec<Arc<ReducedBody>>,
+    names: Vec<String>,
+    /// M̄₀ of each.
+    own: Vec<Mat6>,
+    points: Vec<Range<usize>>,
+    modes: Vec<Range<usize>>,
+    /// Largest distance of a body's points from its centre, m.
+    sizes: Vec<f64>,
+    cells: Cells,
+    /// Pairs of cells with bodies that don't feel each other.
+    refused: BTreeSet<[usize; 2]>,
+    levels: Levels,
+    table: Table,
+}
+
+impl Scattering {
+    /// From compressed bodies with their names, and where they are at the start (all in the water): those that lie together there are seen together from afar. It stays right
+    /// wherever they go, but is fast as long as neighbours stay about each other.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for other numbers of names or poses, or poses that aren't finite.
+    pub fn new(
+        bodies: Vec<Arc<ReducedBody>>,
+        names: Vec<String>,
+        start: &[Pose],
+        levels: Levels,
+    ) -> Result<Self> {
+        if [names.len(), start.len()] != [bodies.len(); 2] {
+            return Err(Error::input(
+                "many bodies: names and poses",
+                format!("{} and {}", names.len(), start.len()),
+                format!("must be {} each, one a body", bodies.len()),
+            ));
+        }
+        let centre = |(body, pose): (&Arc<ReducedBody>, &Pose)| pose.apply(&body.parts().centre);
+        let centres: Vec<_> = bodies.iter().zip(start).map(centre).collect();
+        if let Some(b) = centres.iter().position(|c| !c.iter().all(|x| x.is_finite())) {
+            return Err(Error::input(
+                format!("many bodies: pose of body {:?}", names[b]),
+                format!("{:?}", centres[b].as_slice()),
+                "must be finite",
+            ));
+        }
+        let size = |body: &Arc<ReducedBody>| {
+            let parts = body.parts();
+            let reach = parts.points.iter().map(|x| (x - parts.centre).norm());
+            reach.fold(0.0, f64::max)
+        };
+        Ok(Self {
+            own: bodies.iter().map(|b| b.parts().added_mass).collect(),
+            points: ranges(bodies.iter().map(|b| b.points())),
+            modes: ranges(bodies.iter().map(|b| b.modes())),
+            sizes: bodies.iter().map(size).collect(),
+            cells: Cells::new(&centres),
+            table: Table::new(levels.degree),
+            refused: BTreeSet::new(),
+            names,
+            levels,
+            bodies,
+        })
+    }
+
+    /// The same, without the flow between these pairs of bodies.
+    ///
+    /// # Errors
+    /// A pair that names a body that doesn't exist.
+    pub fn excluding(mut self, pairs: &Exclusions) -> Result<Self> {
+        pairs.check(self.bodies.len())?;
+        for (a, b) in pairs.iter() {
+            let [left, right] = [a, b].map(|b| self.cells.around(b));
+            for i in &left {
+                self.refused.extend(right.iter().map(|j| [*i.min(j), *i.max(j)]));
+            }
+        }
+        Ok(self)
+    }
+
+    /// From bodies that were coupled by a factor.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for images and pairs that fade out or are left out; as [`Scattering::new`].
+    pub fn of(reduced: &Reduced, start: &[Pose], levels: Levels) -> Result<Self> {
+        let bodies = reduced.reduced_bodies();
+        let plain = |l: &Link| l.image.is_identity() && l.cutoff.is_none();
+        let pairs = bodies.len() * bodies.len().saturating_sub(1) / 2;
+        if !reduced.links().iter().all(plain) || reduced.links().len() != pairs {
+            return Err(Error::Unsupported {
+                what: "products alone between many bodies".into(),
+                why: "walls, pairs that are left out, and pairs that fade out aren't there".into(),
+                instead: "use the coupling by a factor".into(),
+            });
+        }
+        let names = bodies.iter().map(|b| b.parts().name.clone()).collect();
+        Self::new(bodies.to_vec(), names, start, levels)
+    }
+
+    /// The bodies.
+    pub fn reduced_bodies(&self) -> &[Arc<ReducedBody>] {
+        &self.bodies
+    }
+
+    /// The added mass of each body alone, at unit density (body frame, about its origin).
+    pub fn own(&self) -> &[Mat6] {
+        &self.own
+    }
+
+    /// How the exchange is cut into levels.
+    pub fn levels(&self) -> &Levels {
+        &self.levels
+    }
+
+    fn point_count(&self) -> usize {
+        end(&self.points)
+    }
+
+    fn mode_count(&self) -> usize {
+        end(&self.modes)
+    }
+}

@@ -1,0 +1,180 @@
+//! Which cells see each other by their moments, and which bodies by their points.
+
+use super::cells::Cells;
+use super::places::{Places, length, minus};
+use crate::adjoint::multipole::Number;
+use std::collections::BTreeSet;
+
+/// Two cells that are no longer wholly seen by their moments: part of what they are to each other is that of their halves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Blend {
+    pub cells: [usize; 2],
+    /// The blend whose halves' part it belongs to.
+    pub within: Option<usize>,
+}
+
+/// Two cells by their moments.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Far {
+    pub cells: [usize; 2],
+    /// Their own blend, if they have one.
+    pub own: Option<usize>,
+    pub within: Option<usize>,
+}
+
+/// Two bodies point by point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    pub bodies: [usize; 2],
+    pub within: Option<usize>,
+}
+
+/// All pairs at some poses.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pairs {
+    pub far: Vec<Far>,
+    pub near: Vec<Near>,
+    /// Each after the one that it is within.
+    pub blends: Vec<Blend>,
+}
+
+/// Sum of the radii over the distance up to which two cells are seen by their moments alone, and from which on not at all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Apart {
+    /// Up to which by moments alone.
+    pub sure: f64,
+    /// From which on not at all.
+    pub most: f64,
+}
+
+impl Apart {
+    /// Weight of the moments, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
+    pub(super) fn weight<T: Number>(&self, ratio: T) -> [T; 2] {
+        let width = self.most - self.sure;
+        let t = (ratio - self.sure) * (1.0 / width);
+        let (zero, one) = (T::from(0.0), T::from(1.0));
+        if t.re() <= 0.0 {
+            return [one, zero];
+        }
+        if t.re() >= 1.0 {
+            return [zero, zero];
+        }
+        let s = one - t;
+        let t3 = t * t * t;
+        let value = one - t3 * t * (((t * -20.0 + 70.0) * t - 84.0) * t + 35.0);
+        let slope = t3 * s * s * s * (-140.0 / width);
+        [value, slope]
+    }
+}
+
+impl Pairs {
+    /// At these places.
+    pub fn new(
+        cells: &Cells,
+        refused: &BTreeSet<[usize; 2]>,
+        places: &Places<f64>,
+        apart: &Apart,
+    ) -> Self {
+        let mut out = Self::default();
+        if cells.cells.is_empty() {
+            return out;
+        }
+        let mut waiting = vec![([0, 0], None)];
+        while let Some(([a, b], within)) = waiting.pop() {
+            let (left, right) = (&cells.cells[a], &cells.cells[b]);
+            if a == b {
+                if let Some([l, r]) = left.halves {
+                    waiting.extend([([l, r], within), ([r, r], within), ([l, l], within)]);
+                }
+                continue;
+            }
+            let ratio = ratio(places, [a, b]);
+            let mut deeper = within;
+            let hold = !refused.is_empty() && refused.contains(&[a.min(b), a.max(b)]);
+            if ratio < apart.most && !hold {
+                let blended = ratio > apart.sure;
+                let own = blended.then_some(out.blends.len());
+                out.far.push(Far {
+                    cells: [a, b],
+                    own,
+                    within,
+                });
+                if !blended {
+                    continue;
+                }
+                deeper = own;
+                out.blends.push(Blend {
+                    cells: [a, b],
+                    within,
+                });
+            }
+            // By numbers of bodies, which don't change: what is chosen by size would change suddenly.
+            match (left.halves, right.halves) {
+                (Some([l, r]), _) if left.count >= right.count => {
+                    waiting.extend([([r, b], deeper), ([l, b], deeper)]);
+                }
+                (_, Some([l, r])) => waiting.extend([([a, r], deeper), ([a, l], deeper)]),
+                (Some([l, r]), None) => waiting.extend([([r, b], deeper), ([l, b], deeper)]),
+                (None, None) if hold => {}
+                (None, None) => out.near.push(Near {
+                    bodies: [cells.bodies(a)[0], cells.bodies(b)[0]],
+                    within: deeper,
+                }),
+            }
+        }
+        out
+    }
+
+    /// What each blend leaves to the halves, all around it taken in, and its own weight of the moments, with its slope.
+    pub fn weights<T: Number>(&self, places: &Places<T>, apart: &Apart) -> Weights<T> {
+        let mut out = Weights {
+            around: Vec::with_capacity(self.blends.len()),
+            own: Vec::with_capacity(self.blends.len()),
+        };
+        for blend in &self.blends {
+            let around = match blend.within {
+                None => T::from(1.0),
+                Some(w) => out.left(w),
+            };
+            out.around.push(around);
+            out.own.push(apart.weight(ratio(places, blend.cells)));
+        }
+        out
+    }
+}
+
+/// Weights of the blends.
+pub(super) struct Weights<T> {
+    /// That of the whole blend.
+    pub around: Vec<T>,
+    /// The part of its moments, with its slope in the ratio.
+    pub own: Vec<[T; 2]>,
+}
+
+impl<T: Number> Weights<T> {
+    /// What is left to the halves of blend `i`.
+    pub fn left(&self, i: usize) -> T {
+        self.around[i] * (T::from(1.0) - self.own[i][0])
+    }
+
+    pub fn within(&self, within: Option<usize>) -> T {
+        within.map_or(T::from(1.0), |w| self.left(w))
+    }
+
+    pub fn of(&self, far: &Far) -> T {
+        match far.own {
+            None => self.within(far.within),
+            Some(own) => self.around[own] * self.own[own][0],
+        }
+    }
+}
+
+/// Sum of the radii over the distance.
+pub(super) fn ratio<T: Number>(places: &Places<T>, [a, b]: [usize; 2]) -> T {
+    let r = minus(&places.centres[a], &places.centres[b]);
+    let distance = length(&r);
+    match distance.re() > 0.0 {
+        true => (places.radii[a] + places.radii[b]) / distance,
+        false => T::from(f64::MAX),
+    }
+}

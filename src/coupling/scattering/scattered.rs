@@ -1,0 +1,366 @@
+//! Many bodies at some poses: charges and impulses for twists, or for what recoils.
+
+use super::Scattering;
+use super::pairs::Pairs;
+use super::places::Places;
+use super::sums::{Gradient, Sums, dual};
+use crate::adjoint::lie::{Mat6, Pose, Vec6};
+use crate::coupling::CouplingReport;
+use crate::solver::{Columns, gmres};
+use crate::{Error, Result};
+use nalgebra::DVector;
+use num_dual::Dual64;
+use std::f64::consts::PI;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+const FLUX: f64 = 4.0 * PI;
+const ITERATIONS: usize = 300;
+const RESTART: usize = 60;
+/// Answers kept: those to the velocity, to a virtual one and to what is driven, at both ends of a pair.
+const KEPT: usize = 6;
+
+/// Twists of all bodies as linear functions of a few coefficients: those of joints, and of a current.
+pub trait Motions: Send + Sync {
+    /// Body-frame twists (6 a body) for coefficients.
+    fn twists(&self, coefficients: &DVector<f64>) -> DVector<f64>;
+
+    /// Its transpose: what body-frame impulses are worth per coefficient.
+    fn transposed(&self, impulses: &DVector<f64>) -> DVector<f64>;
+}
+
+/// What all bodies are in the water as they move.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// Body-frame twists, 6 a body.
+    pub twists: DVector<f64>,
+    /// α, all points.
+    pub charges: Vec<f64>,
+    /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
+    pub exchanged: DVector<f64>,
+}
+
+/// What [`Scattered::recoil`] finds.
+#[derive(Clone, Debug)]
+pub struct Recoiled {
+    /// Impulses that others exchange with each body, body frames, unit density.
+    pub exchanged: DVector<f64>,
+    modes: Vec<f64>,
+}
+
+/// Many bodies at some poses.
+pub struct Scattered<'a> {
+    pub(super) model: &'a Scattering,
+    pub(super) poses: Vec<Pose>,
+    pub(super) pairs: Pairs,
+    places: Places<f64>,
+    pub(super) motions: Box<dyn Motions + 'a>,
+    kept: Mutex<Kept>,
+}
+
+#[derive(Default)]
+struct Kept {
+    answers: Vec<Arc<Answer>>,
+    report: CouplingReport,
+    failed: Option<(usize, f64)>,
+}
+
+impl Scattering {
+    /// Places the bodies.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for another number of poses.
+    pub fn place<'a>(
+        &'a self,
+        poses: &[Pose],
+        motions: Box<dyn Motions + 'a>,
+    ) -> Result<Scattered<'a>> {
+        if poses.len() != self.bodies.len() {
+            return Err(Error::input(
+                "many bodies: poses",
+                poses.len(),
+                format!("must be {}, one a body", self.bodies.len()),
+            ));
+        }
+        let places = Places::new(&self.bodies, &self.sizes, &self.cells, poses);
+        Ok(Scattered {
+            pairs: Pairs::new(&self.cells, &self.refused, &places, &self.levels.apart),
+            places,
+            poses: poses.to_vec(),
+            model: self,
+            motions,
+            kept: Mutex::default(),
+        })
+    }
+}
+
+impl Scattered<'_> {
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What moves the bodies.
+    pub fn motions(&self) -> &dyn Motions {
+        self.motions.as_ref()
+    }
+
+    /// The added mass of each body alone, at unit density (body frame, about its origin).
+    pub fn own(&self) -> &[Mat6] {
+        self.model.own()
+    }
+
+    /// What solves cost so far.
+    pub fn report(&self) -> CouplingReport {
+        self.kept().report.clone()
+    }
+
+    /// Whether all solves so far met their tolerance.
+    ///
+    /// # Errors
+    /// [`Error::Solver`] for the first that didn't.
+    pub fn check(&self) -> Result<()> {
+        match self.kept().failed {
+            None => Ok(()),
+            Some((iterations, residual)) => Err(Error::Solver {
+                what: "exchange between many bodies".into(),
+                iterations,
+                residual,
+                tolerance: self.model.levels.tolerance,
+                remedy: "bodies are nearer than their compressed sources resolve, or overlap: keep them \
+                         apart by contact, or give a smaller resolved_gap"
+                    .into(),
+            }),
+        }
+    }
+
+    fn sums(&self) -> Sums<'_, f64> {
+        Sums::new(self.model, &self.pairs, &self.places)
+    }
+
+    /// [L, Ū]ᵀ ψ of every body: of the modes, and of the twists.
+    fn projected(&self, potentials: &[f64]) -> (Vec<f64>, DVector<f64>) {
+        let model = self.model;
+        let mut modes = vec![0.0; model.mode_count()];
+        let mut impulses = DVector::zeros(6 * model.bodies.len());
+        for (b, body) in model.bodies.iter().enumerate() {
+            let (own, m) = (&model.modes[b], body.modes());
+            let seen = &potentials[model.points[b].clone()];
+            let columns = body.basis().column_iter();
+            for (k, column) in columns.enumerate() {
+                let sum = column.iter().zip(seen).map(|(l, x)| l * x).sum();
+                match k.checked_sub(m) {
+                    None => modes[own.start + k] = sum,
+                    Some(k) => impulses[6 * b + k] = FLUX * sum,
+                }
+            }
+        }
+        (modes, impulses)
+    }
+
+    /// α = Ū x̄ + L a.
+    fn charges(&self, twists: &DVector<f64>, modes: &[f64]) -> Vec<f64> {
+        let model = self.model;
+        let mut out = vec![0.0; model.point_count()];
+        for (b, body) in model.bodies.iter().enumerate() {
+            let (own, m) = (&model.modes[b], body.modes());
+            let out = &mut out[model.points[b].clone()];
+            for (k, column) in body.basis().column_iter().enumerate() {
+                let factor = match k.checked_sub(m) {
+                    None => modes[own.start + k],
+                    Some(k) => twists[6 * b + k],
+                };
+                for (out, l) in out.iter_mut().zip(column.iter()) {
+                    *out += factor * l;
+                }
+            }
+        }
+        out
+    }
+
+    /// a = Lᵀ(ψ + Ĝ L a), from what else the points see.
+    fn scattered(&self, potentials: &[f64]) -> Vec<f64> {
+        let (right, _) = self.projected(potentials);
+        let still = DVector::zeros(6 * self.model.bodies.len());
+        let sums = self.sums();
+        self.solve(&right, |a| {
+            let seen = sums.potentials(&self.charges(&still, a));
+            self.projected(&seen).0
+        })
+    }
+
+    /// x with x = right + f(x).
+    fn solve(&self, right: &[f64], f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+        let column = |data: Vec<f64>| Columns {
+            rows: data.len(),
+            columns: 1,
+            data,
+        };
+        let apply = |v: &Columns, _: &[usize]| {
+            let mut out = v.data.clone();
+            for (out, x) in out.iter_mut().zip(f(&v.data)) {
+                *out -= x;
+            }
+            [v.clone(), column(out)]
+        };
+        let tolerance = self.model.levels.tolerance;
+        let found = gmres(apply, &column(right.to_vec()), tolerance, ITERATIONS, RESTART);
+        let mut kept = self.kept();
+        kept.report.iterations = kept.report.iterations.max(found.iterations);
+        kept.report.residual = kept.report.residual.max(found.residual);
+        let met = found.residual <= 1.001 * tolerance.max(1e-13);
+        if !met && kept.failed.is_none() {
+            kept.failed = Some((found.iterations, found.residual));
+        }
+        found.x.data
+    }
+
+    /// The answer to body-frame twists.
+    pub fn respond(&self, twists: &DVector<f64>) -> Arc<Answer> {
+        if let Some(known) = self.kept().answers.iter().find(|a| a.twists == *twists) {
+            return known.clone();
+        }
+        if twists.iter().all(|x| *x == 0.0) {
+            return self.keep(Answer {
+                charges: vec![0.0; self.model.point_count()],
+                exchanged: twists.clone(),
+                twists: twists.clone(),
+            });
+        }
+        let none = vec![0.0; self.model.mode_count()];
+        let own = self.charges(twists, &none);
+        let modes = self.scattered(&self.sums().potentials(&own));
+        self.keep(self.answer(twists, &modes))
+    }
+
+    fn answer(&self, twists: &DVector<f64>, modes: &[f64]) -> Answer {
+        let charges = self.charges(twists, modes);
+        let (_, exchanged) = self.projected(&self.sums().potentials(&charges));
+        Answer {
+            twists: twists.clone(),
+            charges,
+            exchanged,
+        }
+    }
+
+    fn keep(&self, answer: Answer) -> Arc<Answer> {
+        let answer = Arc::new(answer);
+        let mut kept = self.kept();
+        if kept.answers.len() >= KEPT {
+            kept.answers.remove(0);
+        }
+        kept.answers.push(answer.clone());
+        answer
+    }
+
+    /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),
+    /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side.
+    pub fn recoil(
+        &self,
+        first: &DVector<f64>,
+        scale: &DVector<f64>,
+        recoil: impl Fn(&DVector<f64>) -> DVector<f64>,
+    ) -> Recoiled {
+        let (m, n) = (self.model.mode_count(), first.len());
+        let unit = FLUX.sqrt();
+        let sums = self.sums();
+        // Modes and twists in units of about the root of their energy.
+        let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
+        let seen = |x: &[f64]| {
+            let twists = DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
+            self.projected(&sums.potentials(&self.charges(&twists, &modes(x))))
+        };
+        let next = |(modes, impulses): (Vec<f64>, DVector<f64>)| -> Vec<f64> {
+            let twists = recoil(&impulses);
+            let modes = modes.into_iter().map(|a| unit * a);
+            let twists = twists.iter().zip(scale.iter()).map(|(t, s)| -t * s);
+            modes.chain(twists).collect()
+        };
+        let mut start = vec![0.0; m];
+        start.extend(first.iter().zip(scale.iter()).map(|(t, s)| t * s));
+        let x = self.solve(&start, |x| next(seen(x)));
+        Recoiled {
+            exchanged: seen(&x).1,
+            modes: modes(&x),
+        }
+    }
+
+    /// Keeps what recoiled as the answer to the twists that follow from it.
+    pub fn settle(&self, twists: DVector<f64>, recoiled: Recoiled) -> Arc<Answer> {
+        self.keep(Answer {
+            charges: self.charges(&twists, &recoiled.modes),
+            exchanged: recoiled.exchanged,
+            twists,
+        })
+    }
+
+    /// 4π αᵀ δĜ α as spatial wrenches.
+    pub(super) fn gradient(&self, charges: &[f64]) -> Vec<Vec6> {
+        let found = self.sums().gradient(charges).wrenches();
+        found.into_iter().map(|w| 2.0 * FLUX * w).collect()
+    }
+
+    /// 4π α_xᵀ δĜ α_y as spatial wrenches.
+    pub(super) fn pull_back(&self, x: &[f64], y: &[f64]) -> Vec<Vec6> {
+        if x == y {
+            return self.gradient(x);
+        }
+        let combined = |sign: f64| -> Vec<f64> {
+            let each = x.iter().zip(y);
+            each.map(|(x, y)| x + sign * y).collect()
+        };
+        let (sum, difference) = (self.gradient(&combined(1.0)), self.gradient(&combined(-1.0)));
+        let each = sum.iter().zip(&difference);
+        each.map(|(s, d)| 0.25 * (s - d)).collect()
+    }
+
+    /// The places as the bodies are displaced.
+    pub(super) fn moving(&self, z: &[Vec6]) -> Places<Dual64> {
+        let model = self.model;
+        Places::moving(&model.bodies, &model.sizes, &model.cells, &self.poses, z)
+    }
+
+    /// `DĜ[Z] α`.
+    pub(super) fn tangent_potentials(&self, places: &Places<Dual64>, charges: &[f64]) -> Vec<f64> {
+        let still = vec![0.0; charges.len()];
+        let sums = Sums::new(self.model, &self.pairs, places);
+        let seen = sums.potentials(&dual(charges, &still));
+        seen.iter().map(|x| x.eps).collect()
+    }
+
+    /// The gradient of ½ αᵀ Ĝ α as bodies are displaced and the charges change.
+    pub(super) fn gradient_jvp(
+        &self,
+        places: &Places<Dual64>,
+        charges: &[f64],
+        rates: &[f64],
+    ) -> Gradient<Dual64> {
+        Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates))
+    }
+
+    /// Charges that bodies that stand still answer potentials with: L a, a = Lᵀ(ψ + Ĝ L a).
+    pub(super) fn answering(&self, potentials: &[f64]) -> Vec<f64> {
+        let still = DVector::zeros(6 * self.model.bodies.len());
+        self.charges(&still, &self.scattered(potentials))
+    }
+
+    /// Ĝ α.
+    pub(super) fn potentials(&self, charges: &[f64]) -> Vec<f64> {
+        self.sums().potentials(charges)
+    }
+
+    /// 4π Ūᵀ ψ.
+    pub(super) fn impulses_of(&self, potentials: &[f64]) -> DVector<f64> {
+        self.projected(potentials).1
+    }
+
+    /// M̄ x̄: with each body's own.
+    pub fn impulses(&self, answer: &Answer) -> DVector<f64> {
+        let mut out = answer.exchanged.clone();
+        for (b, own) in self.model.own.iter().enumerate() {
+            let own: &Mat6 = own;
+            let twist = answer.twists.fixed_rows::<6>(6 * b).into_owned();
+            let mut rows = out.fixed_rows_mut::<6>(6 * b);
+            rows += own * twist;
+        }
+        out
+    }
+}

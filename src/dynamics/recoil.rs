@@ -1,0 +1,129 @@
+//! M(q)⁻¹ of many bodies that feel each other, without M(q): what others exchange with each recoils in its own inertia.
+//!
+//! With the bodies' inertias alone, own added mass with them, M = M₀ + ρ Jᵀ H J, H v̄ the impulses that others exchange with each body. M v = p is v = M₀⁻¹ (p − ρ Jᵀ h), h = H J v, and
+//! with M₀⁻¹ of each joint tree for itself ([`Articulated`]) the system is one in the charges ([`Scattered::recoil`]).
+
+use super::{Evaluation, System};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
+use crate::coupling::scattering::{Motions, Scattered};
+use crate::multibody::{Articulated, Kinematics};
+use nalgebra::DVector;
+use std::sync::Arc;
+
+/// Least inertia, of a body's largest, that a twist is measured by.
+const LEAST: f64 = 1e-6;
+
+/// The bodies in the water as the joints move them, and the current past them.
+pub(super) struct TreeMotions<'a> {
+    system: &'a System,
+    kinematics: Kinematics,
+}
+
+impl<'a> TreeMotions<'a> {
+    pub fn new(system: &'a System, kinematics: Kinematics) -> Self {
+        Self { system, kinematics }
+    }
+}
+
+impl Motions for TreeMotions<'_> {
+    fn twists(&self, coefficients: &DVector<f64>) -> DVector<f64> {
+        let (system, tree) = (self.system, &self.system.tree);
+        let nv = tree.velocities();
+        let v = coefficients.rows(0, nv).into_owned();
+        let carried = coefficients.get(nv).copied().unwrap_or(0.0);
+        let mut field = tree.twists(&self.kinematics, &v);
+        if carried != 0.0 {
+            let current = carried * six(&system.current, &Vec3::zeros());
+            field.iter_mut().for_each(|twist| *twist -= current);
+        }
+        system.submerged_twists(&self.kinematics, &field)
+    }
+
+    fn transposed(&self, impulses: &DVector<f64>) -> DVector<f64> {
+        let (system, tree) = (self.system, &self.system.tree);
+        let mut field = vec![Vec6::zeros(); system.len()];
+        for (b, w) in system.submerged() {
+            let h = impulses.fixed_rows::<6>(6 * w).into_owned();
+            field[b] = self.kinematics.poses[b].wrench_to_world(&h);
+        }
+        let current = six(&system.current, &Vec3::zeros());
+        let carried: f64 = field.iter().map(|h| -current.dot(h)).sum();
+        let out = tree.project(&self.kinematics.columns, field);
+        match system.has_current() {
+            true => out.push(carried),
+            false => out,
+        }
+    }
+}
+
+/// The factor of M(q), free rows and columns, of many bodies.
+pub struct Recoiling<'a> {
+    at: Arc<Scattered<'a>>,
+    /// M₀.
+    own: Articulated,
+    /// About the root of the inertia of each body-frame twist, at unit density.
+    scale: DVector<f64>,
+    density: f64,
+    /// Whether a current's coefficient stands behind the velocities.
+    current: bool,
+}
+
+impl<'a> Recoiling<'a> {
+    pub(super) fn new(
+        evaluation: &Evaluation<'a>,
+        at: &Arc<Scattered<'a>>,
+        own: Articulated,
+    ) -> Self {
+        let system = evaluation.system;
+        let density = evaluation.parameters.density();
+        let mut scale = DVector::zeros(6 * system.coupling.bodies());
+        for (b, w) in system.submerged() {
+            let inertia: Mat6 = evaluation.rigid[b] / density + at.own()[w];
+            let diagonal = inertia.diagonal();
+            let most = [0, 3].map(|k| diagonal.rows(k, 3).max());
+            for i in 0..6 {
+                let least = LEAST * most[i / 3].max(f64::MIN_POSITIVE);
+                scale[6 * w + i] = diagonal[i].max(least).sqrt();
+            }
+        }
+        Self {
+            at: at.clone(),
+            own,
+            scale,
+            density,
+            current: system.has_current(),
+        }
+    }
+
+    /// Body-frame twists at velocities, water at rest.
+    fn twists(&self, v: &DVector<f64>) -> DVector<f64> {
+        match self.current {
+            true => self.at.motions().twists(&v.push(0.0)),
+            false => self.at.motions().twists(v),
+        }
+    }
+
+    /// What exchanged impulses change of the velocities of bodies that answer alone.
+    fn answered(&self, impulses: &DVector<f64>) -> DVector<f64> {
+        let mut all = self.at.motions().transposed(impulses);
+        if self.current {
+            all = all.rows(0, all.len() - 1).into_owned();
+        }
+        self.own.solve(&(self.density * all))
+    }
+
+    /// v with M v = `right` on the free rows; driven ones rest.
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        self.solve_beside(right, &DVector::zeros(right.len()))
+    }
+
+    /// v with given velocities `driven` (zero where free), and M v = `right` + M₀ `driven` on the free rows.
+    pub fn solve_beside(&self, right: &DVector<f64>, driven: &DVector<f64>) -> DVector<f64> {
+        let first = driven + self.own.solve(right);
+        let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
+        let found = (self.at).recoil(&self.twists(&first), &self.scale, recoil);
+        let v = first - self.answered(&found.exchanged);
+        self.at.settle(self.twists(&v), found);
+        v
+    }
+}

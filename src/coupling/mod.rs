@@ -254,6 +254,17 @@ pub struct Tangent {
     pub wrench: Vec<Vec6>,
 }
 
+/// What twists w beside x̄ and a displacement Z of the bodies add up to.
+#[derive(Clone, Debug)]
+pub struct Carried {
+    /// M̄_f w + `D_g M̄_f[Z] x̄`, body-frame impulses (6·bodies).
+    pub momentum: DVector<f64>,
+    /// ∇_g E(w, x̄), and half the rate of ∇_g E(x̄, x̄) along Z: spatial wrenches.
+    pub wrench: Vec<Vec6>,
+    /// ∇_g E(x̄, x̄).
+    pub gradient: Vec<Vec6>,
+}
+
 /// One evaluation at given poses with the key to the derivatives there.
 pub trait Linearised: Send + Sync {
     /// M̄_f times the basis: body-frame impulses, 6·bodies × k; 0 × 0 where a coupling that forms no matrix was placed without a basis.
@@ -308,6 +319,19 @@ pub trait Linearised: Send + Sync {
             }
         }
         Ok((momenta, wrenches))
+    }
+
+    /// Of x, coefficients on the basis, what further twists (6·bodies) and a displacement add up to, where that takes fewer solves than each for itself.
+    ///
+    /// # Errors
+    /// A solve that misses its tolerance.
+    fn carried(
+        &self,
+        _x: &DVector<f64>,
+        _twists: &DVector<f64>,
+        _z: &[Vec6],
+    ) -> Result<Option<Carried>> {
+        Ok(None)
     }
 
     /// [`Linearised::hvp`] of x, coefficients on the basis, with itself along each displacement.

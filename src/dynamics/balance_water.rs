@@ -5,8 +5,22 @@ use super::shape::Bilinear;
 use super::{ForceCotangents, Linearisation};
 use crate::Result;
 use crate::adjoint::lie::{Vec6, cross_force, cross_motion};
+use crate::coupling::{Carried, Tangent};
 use crate::multibody::{Cotangents, Fields};
 use nalgebra::{DMatrix, DVector};
+
+/// Impulses, wrenches and a tangent of one column whose sums alone are known.
+fn summed(found: Carried) -> (DMatrix<f64>, Vec<Vec<Vec6>>, Vec<Tangent>) {
+    let none = DVector::zeros(found.momentum.len());
+    let tangent = Tangent {
+        momentum_x: none.clone(),
+        momentum_y: none,
+        wrench: vec![Vec6::zeros(); found.gradient.len()],
+        gradient: found.gradient,
+    };
+    let impulses = DMatrix::from_columns(&[found.momentum]);
+    (impulses, vec![found.wrench], vec![tangent])
+}
 
 impl Linearisation<'_> {
     /// The fluid's part: the gradient of `ρ {(D − U × Z) · h_f + ½ D_g E(v, v)[Z]}` of each field.
@@ -33,12 +47,23 @@ impl Linearisation<'_> {
         let carried: Vec<Vec<Vec6>> = fields.iter().map(carried).collect();
         let columns = carried.iter().map(|field| self.submerged_twists(field));
         let columns = DMatrix::from_columns(&columns.collect::<Vec<_>>());
-        let (impulses, pairs) = water.linearised.respond(&columns, &direction)?;
-        // ½ D_g E(v, v)[Z].
         let virt = fields
             .iter()
             .map(|f| self.submerged_field(&f.virtual_twist));
-        let tangents = (water.linearised).displaced(&direction, &virt.collect::<Vec<_>>())?;
+        let virt: Vec<Vec<Vec6>> = virt.collect();
+        let together = match &virt[..] {
+            [z] => (water.linearised).carried(&direction, &columns.column(0).into_owned(), z)?,
+            _ => None,
+        };
+        let (impulses, pairs, tangents) = match together {
+            Some(found) => summed(found),
+            None => {
+                let (impulses, pairs) = water.linearised.respond(&columns, &direction)?;
+                // ½ D_g E(v, v)[Z].
+                let tangents = (water.linearised).displaced(&direction, &virt)?;
+                (impulses, pairs, tangents)
+            }
+        };
         if rows.by_parameters() && !self.system.shapes.water.is_empty() {
             let relative: Vec<Vec6> = fields[0].twist.iter().map(|t| self.relative(t)).collect();
             let through = (Some(&direction), relative.as_slice());

@@ -82,6 +82,7 @@ pub use crate::policy::{
     SpeedStage, SpeedStages, Wave, WaveJoint,
 };
 pub use crate::water::{
-    AdapterName, Arithmetic, Backend, BackendReport, Carried, DeviceReport, Discretisation, Exchange,
-    ErrorEstimate, Fidelity, GapError, GpuSettings, Knob, Level, Method, Numerics, WaterChoices,
+    AdapterName, Arithmetic, Backend, BackendReport, Carried, DeviceReport, Discretisation,
+    ErrorEstimate, Exchange, Fidelity, GapError, GpuSettings, Knob, Level, Method, Numerics,
+    WaterChoices,
 };

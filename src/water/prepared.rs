@@ -92,8 +92,7 @@ pub(crate) fn prepare(
     )?;
     (problem.plan, problem.folder) = (&planned.plan, folder);
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
-    clearance.films =
-        choices.numerics.films && fidelity.kind().compresses() && !problem.products;
+    clearance.films = choices.numerics.films && fidelity.kind().compresses() && !problem.products;
     clearance.resolved_edges = match (clearance.films, fidelity.kind().compresses()) {
         (true, _) => FILM_EDGES,
         // What compressed bodies resolve isn't a matter of edges.

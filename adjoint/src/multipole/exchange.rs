@@ -8,19 +8,20 @@
 //!
 //! up to terms of the degree p + 1 in (size of the clouds)/R. The sum over whole degrees turns and moves with the clouds.
 
-use super::{Number, Table};
+use super::{Arithmetic, Table};
 
 /// The derivatives of 1/|R|, by multi-index, up to the degree of the moments or `one_more`.
-pub fn derivatives<T: Number>(table: &Table, r: &[T; 3], one_more: bool, out: &mut [T]) {
+#[inline(always)]
+pub fn derivatives<T: Arithmetic>(table: &Table, r: &[T; 3], one_more: bool, out: &mut [T]) {
     let square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-    let inverse = square.recip();
-    out[0] = inverse.sqrt();
+    let inverse = square.inverse();
+    out[0] = inverse.root();
     for n in 1..table.derivatives(one_more) {
-        let mut sum = T::from(0.0);
-        for lower in &table.once[n] {
-            sum += out[lower.at] * r[lower.axis] * lower.factor;
+        let mut sum = T::constant(0.0);
+        for lower in table.once(n) {
+            sum += out[lower.at] * (r[lower.axis] * lower.factor);
         }
-        for lower in &table.twice[n] {
+        for lower in table.twice(n) {
             sum += out[lower.at] * lower.factor;
         }
         out[n] = sum * inverse;
@@ -28,7 +29,8 @@ pub fn derivatives<T: Number>(table: &Table, r: &[T; 3], one_more: bool, out: &m
 }
 
 /// Moments with the signs (−1)^|l|, as those of the cloud that R comes from stand in the sum.
-pub fn signed<T: Number>(table: &Table, moments: &[T], out: &mut [T]) {
+#[inline(always)]
+pub fn signed<T: Arithmetic>(table: &Table, moments: &[T], out: &mut [T]) {
     for ((out, m), sign) in out.iter_mut().zip(moments).zip(&table.sign) {
         *out = *m * *sign;
     }
@@ -36,34 +38,41 @@ pub fn signed<T: Number>(table: &Table, moments: &[T], out: &mut [T]) {
 
 /// What each cloud's moments see of the other: adds `weight` times the coefficients of the potentials to `seen`, of both; those of n
 /// without the signs that n itself comes with ([`signed`]).
-pub fn see<T: Number>(
+#[inline(always)]
+pub fn see<T: Arithmetic>(
     table: &Table,
     d: &[T],
     weight: T,
     [m, n]: [&[T]; 2],
     [seen_m, seen_n]: [&mut [T]; 2],
 ) {
-    for (k, sums) in table.sums.iter().enumerate() {
-        let (own, mut sum) = (m[k] * weight, T::from(0.0));
-        for ((n, seen), at) in n.iter().zip(seen_n.iter_mut()).zip(sums) {
+    for (k, (m, seen_m)) in m.iter().zip(seen_m.iter_mut()).enumerate() {
+        let (own, mut sum) = (*m * weight, T::constant(0.0));
+        for ((n, seen), at) in n.iter().zip(seen_n.iter_mut()).zip(table.sums(k)) {
             let d = d[*at as usize];
             sum += *n * d;
             *seen += own * d;
         }
-        seen_m[k] += sum * weight;
+        *seen_m += sum * weight;
     }
 }
 
-/// The energy of two clouds and its gradient in R, from derivatives to one more degree.
-pub fn energy<T: Number>(table: &Table, d: &[T], [m, n]: [&[T]; 2]) -> (T, [T; 3]) {
-    let mut both = vec![T::from(0.0); m.len()];
-    for (m, sums) in m.iter().zip(&table.sums) {
-        for (n, at) in n.iter().zip(sums) {
+/// The energy of two clouds and its gradient in R, from derivatives to one more degree; `both` is room for as many numbers as there are moments.
+#[inline(always)]
+pub fn energy<T: Arithmetic>(
+    table: &Table,
+    d: &[T],
+    [m, n]: [&[T]; 2],
+    both: &mut [T],
+) -> (T, [T; 3]) {
+    both.fill(T::constant(0.0));
+    for (k, m) in m.iter().enumerate() {
+        for (n, at) in n.iter().zip(table.sums(k)) {
             both[*at as usize] += *m * *n;
         }
     }
-    let (mut energy, mut slope) = (T::from(0.0), [T::from(0.0); 3]);
-    for ((c, d_own), higher) in both.iter().zip(d).zip(&table.higher) {
+    let (mut energy, mut slope) = (T::constant(0.0), [T::constant(0.0); 3]);
+    for ((c, d_own), higher) in both.iter().zip(d.iter()).zip(&table.higher) {
         energy += *c * *d_own;
         for (slope, at) in slope.iter_mut().zip(higher) {
             *slope += *c * d[*at as usize];

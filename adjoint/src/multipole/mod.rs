@@ -8,6 +8,7 @@
 
 mod exchange;
 mod moments;
+mod number;
 mod table;
 
 pub use exchange::{derivatives, energy, see, signed};
@@ -16,9 +17,9 @@ pub use moments::{
 };
 pub use table::{MOST, Table};
 
-use num_dual::DualNum;
+pub use number::{Arithmetic, DualPack, Number, Pack, WIDTH};
 
-/// A number, or one that carries its derivatives.
-pub trait Number: DualNum<Primitive = f64> + Copy + Send + Sync {}
-
-impl<T: DualNum<Primitive = f64> + Copy + Send + Sync> Number for T {}
+/// Runs `op`, all of it inlined, with the widest vectors of this processor. Nothing is contracted: results are the same whatever the width.
+pub fn vectorized<R>(op: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(op)
+}

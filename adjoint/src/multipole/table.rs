@@ -21,10 +21,13 @@ pub struct Table {
     /// Of the monomial aᵏ/k!: the one that it is a multiple of, by a factor times a coordinate.
     pub(super) monomial: Vec<Lower>,
     /// Of each derivative of 1/r those that it follows from: factors of coordinate times the next lower, and of those two lower.
-    pub(super) once: Vec<Vec<Lower>>,
-    pub(super) twice: Vec<Vec<Lower>>,
+    lowers: Vec<Lower>,
+    /// Where those of each begin among `lowers`, and where those of two lower do.
+    ways: Vec<[u32; 3]>,
     /// Of each k of degree d, for the l up to the degree left: where k + l stands, one after the other.
-    pub(super) sums: Vec<Vec<u16>>,
+    sums: Vec<u16>,
+    /// Where those of each begin.
+    sums_from: Vec<u32>,
     /// Of each k the one lower along each axis.
     pub(super) lower: Vec<[Option<u16>; 3]>,
     /// Of each k the one higher along each axis; up to one degree less.
@@ -86,11 +89,25 @@ impl Table {
             let left = counts[degree + 1 - size(k)];
             index[..left].iter().map(|l| up(k, l) as u16).collect()
         };
+        let (mut lowers, mut ways) = (Vec::new(), Vec::new());
+        for k in &index {
+            let first = lowers.len() as u32;
+            lowers.extend(once(k));
+            let middle = lowers.len() as u32;
+            lowers.extend(twice(k));
+            ways.push([first, middle, lowers.len() as u32]);
+        }
+        let (mut all_sums, mut sums_from) = (Vec::new(), vec![0]);
+        for k in &index[..moments] {
+            all_sums.extend(sums(k));
+            sums_from.push(all_sums.len() as u32);
+        }
         Self {
             monomial: index.iter().map(monomial).collect(),
-            once: index.iter().map(once).collect(),
-            twice: index.iter().map(twice).collect(),
-            sums: index[..moments].iter().map(sums).collect(),
+            lowers,
+            ways,
+            sums: all_sums,
+            sums_from,
             lower: (index.iter())
                 .map(|k| [0, 1, 2].map(|axis| down(k, axis, 1).map(|at| at as u16)))
                 .collect(),
@@ -104,6 +121,21 @@ impl Table {
             index,
             counts,
         }
+    }
+
+    #[inline(always)]
+    pub(super) fn once(&self, n: usize) -> &[Lower] {
+        &self.lowers[self.ways[n][0] as usize..self.ways[n][1] as usize]
+    }
+
+    #[inline(always)]
+    pub(super) fn twice(&self, n: usize) -> &[Lower] {
+        &self.lowers[self.ways[n][1] as usize..self.ways[n][2] as usize]
+    }
+
+    #[inline(always)]
+    pub(super) fn sums(&self, k: usize) -> &[u16] {
+        &self.sums[self.sums_from[k] as usize..self.sums_from[k + 1] as usize]
     }
 
     /// Highest degree of moments.

@@ -11,8 +11,10 @@ const TOLERANCE: f64 = 1e-11;
 pub struct Levels {
     /// Highest degree of the moments' products: 2 is dipoles with dipoles.
     pub degree: usize,
-    /// From where on moments stand for points.
-    pub apart: Apart,
+    /// From where on the moments of two bodies stand for their points.
+    pub bodies: Apart,
+    /// From where on those of two cells do, of which one holds several bodies: what is left out differs in sign from body to body.
+    pub cells: Apart,
     /// Relative residual at which solves end.
     pub tolerance: f64,
 }
@@ -38,13 +40,32 @@ impl Levels {
             a if a >= 1e-4 => 8,
             _ => 10,
         };
+        let env = |n: &str, d: f64| {
+            std::env::var(n)
+                .ok()
+                .and_then(|x| x.parse().ok())
+                .unwrap_or(d)
+        };
+        let degree = env("DEG", degree as f64) as usize;
+        let most = env("THETA", 0.4);
         Ok(Self {
             degree,
-            apart: Apart {
-                sure: 0.45,
-                most: 0.5,
+            bodies: Apart {
+                sure: 0.9 * most,
+                most,
             },
-            tolerance: TOLERANCE,
+            cells: Apart {
+                sure: 0.9 * env("THETA2", 0.5),
+                most: env("THETA2", 0.5),
+            },
+            tolerance: env("TOL", TOLERANCE),
         })
+    }
+
+    pub(super) fn of(&self, bodies: bool) -> &Apart {
+        match bodies {
+            true => &self.bodies,
+            false => &self.cells,
+        }
     }
 }

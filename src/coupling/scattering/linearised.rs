@@ -4,7 +4,7 @@ use super::Scattering;
 use super::scattered::{Answer, Motions, Scattered};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::{
-    Coupling, CouplingReport, Direction, Linearised, Momenta, Pullback, Tangent,
+    Carried, Coupling, CouplingReport, Direction, Linearised, Momenta, Pullback, Tangent,
 };
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -124,6 +124,32 @@ impl Linearised for ScatteredLinearised<'_> {
         };
         self.at.check()?;
         Ok(out)
+    }
+
+    fn carried(
+        &self,
+        x: &DVector<f64>,
+        twists: &DVector<f64>,
+        z: &[Vec6],
+    ) -> Result<Option<Carried>> {
+        let at = &self.at;
+        let answer = self.respond(&Direction::Basis(x));
+        let places = at.moving(z);
+        // Charges that the twists ask for, and those that answer the displacement, in one solve.
+        let seen = at.tangent_potentials(&places, &answer.charges);
+        let rates = at.answering_beside(twists, &seen);
+        let found = at.gradient_jvp(&places, &answer.charges, &rates);
+        let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
+        let mut momentum = at.impulses_of(&seen);
+        at.add_own(twists, &mut momentum);
+        let [gradient, rate] = found.wrenches_and_rates();
+        at.check()?;
+        let scaled = |w: Vec<Vec6>, by: f64| w.into_iter().map(|w| by * w).collect();
+        Ok(Some(Carried {
+            momentum,
+            wrench: scaled(rate, FLUX),
+            gradient: scaled(gradient, 2.0 * FLUX),
+        }))
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {

@@ -18,8 +18,10 @@
 //! whose M̄ is never formed. The energy's gradient is a Coulomb sum of the charges, its derivatives those of the same sums in dual numbers.
 
 mod cells;
+mod far;
 mod levels;
 mod linearised;
+mod near;
 mod pairs;
 mod places;
 mod scattered;
@@ -80,7 +82,10 @@ impl Scattering {
         }
         let centre = |(body, pose): (&Arc<ReducedBody>, &Pose)| pose.apply(&body.parts().centre);
         let centres: Vec<_> = bodies.iter().zip(start).map(centre).collect();
-        if let Some(b) = centres.iter().position(|c| !c.iter().all(|x| x.is_finite())) {
+        if let Some(b) = centres
+            .iter()
+            .position(|c| !c.iter().all(|x| x.is_finite()))
+        {
             return Err(Error::input(
                 format!("many bodies: pose of body {:?}", names[b]),
                 format!("{:?}", centres[b].as_slice()),
@@ -115,7 +120,8 @@ impl Scattering {
         for (a, b) in pairs.iter() {
             let [left, right] = [a, b].map(|b| self.cells.around(b));
             for i in &left {
-                self.refused.extend(right.iter().map(|j| [*i.min(j), *i.max(j)]));
+                self.refused
+                    .extend(right.iter().map(|j| [*i.min(j), *i.max(j)]));
             }
         }
         Ok(self)

@@ -1,6 +1,7 @@
 //! Which cells see each other by their moments, and which bodies by their points.
 
 use super::cells::Cells;
+use super::levels::Levels;
 use super::places::{Places, length, minus};
 use crate::adjoint::multipole::Number;
 use std::collections::BTreeSet;
@@ -11,6 +12,8 @@ pub(super) struct Blend {
     pub cells: [usize; 2],
     /// The blend whose halves' part it belongs to.
     pub within: Option<usize>,
+    /// Whether both are single bodies.
+    pub bodies: bool,
 }
 
 /// Two cells by their moments.
@@ -51,17 +54,20 @@ impl Apart {
     /// Weight of the moments, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
     pub(super) fn weight<T: Number>(&self, ratio: T) -> [T; 2] {
         let width = self.most - self.sure;
-        let t = (ratio - self.sure) * (1.0 / width);
-        let (zero, one) = (T::from(0.0), T::from(1.0));
-        if t.re() <= 0.0 {
+        let t = (ratio - T::constant(self.sure)) * (1.0 / width);
+        let (zero, one) = (T::constant(0.0), T::constant(1.0));
+        if t.value() <= 0.0 {
             return [one, zero];
         }
-        if t.re() >= 1.0 {
+        if t.value() >= 1.0 {
             return [zero, zero];
         }
         let s = one - t;
         let t3 = t * t * t;
-        let value = one - t3 * t * (((t * -20.0 + 70.0) * t - 84.0) * t + 35.0);
+        let value = one
+            - t3 * t
+                * (((t * -20.0 + T::constant(70.0)) * t - T::constant(84.0)) * t
+                    + T::constant(35.0));
         let slope = t3 * s * s * s * (-140.0 / width);
         [value, slope]
     }
@@ -73,7 +79,7 @@ impl Pairs {
         cells: &Cells,
         refused: &BTreeSet<[usize; 2]>,
         places: &Places<f64>,
-        apart: &Apart,
+        apart: &Levels,
     ) -> Self {
         let mut out = Self::default();
         if cells.cells.is_empty() {
@@ -89,6 +95,7 @@ impl Pairs {
                 continue;
             }
             let ratio = ratio(places, [a, b]);
+            let apart = apart.of(left.count == 1 && right.count == 1);
             let mut deeper = within;
             let hold = !refused.is_empty() && refused.contains(&[a.min(b), a.max(b)]);
             if ratio < apart.most && !hold {
@@ -106,6 +113,7 @@ impl Pairs {
                 out.blends.push(Blend {
                     cells: [a, b],
                     within,
+                    bodies: left.count == 1 && right.count == 1,
                 });
             }
             // By numbers of bodies, which don't change: what is chosen by size would change suddenly.
@@ -122,21 +130,24 @@ impl Pairs {
                 }),
             }
         }
+        // Those of one cell together, as they are summed.
+        out.far.sort_by_key(|far| far.cells);
         out
     }
 
     /// What each blend leaves to the halves, all around it taken in, and its own weight of the moments, with its slope.
-    pub fn weights<T: Number>(&self, places: &Places<T>, apart: &Apart) -> Weights<T> {
+    pub fn weights<T: Number>(&self, places: &Places<T>, apart: &Levels) -> Weights<T> {
         let mut out = Weights {
             around: Vec::with_capacity(self.blends.len()),
             own: Vec::with_capacity(self.blends.len()),
         };
         for blend in &self.blends {
             let around = match blend.within {
-                None => T::from(1.0),
+                None => T::constant(1.0),
                 Some(w) => out.left(w),
             };
             out.around.push(around);
+            let apart = apart.of(blend.bodies);
             out.own.push(apart.weight(ratio(places, blend.cells)));
         }
         out
@@ -154,11 +165,11 @@ pub(super) struct Weights<T> {
 impl<T: Number> Weights<T> {
     /// What is left to the halves of blend `i`.
     pub fn left(&self, i: usize) -> T {
-        self.around[i] * (T::from(1.0) - self.own[i][0])
+        self.around[i] * (T::constant(1.0) - self.own[i][0])
     }
 
     pub fn within(&self, within: Option<usize>) -> T {
-        within.map_or(T::from(1.0), |w| self.left(w))
+        within.map_or(T::constant(1.0), |w| self.left(w))
     }
 
     pub fn of(&self, far: &Far) -> T {
@@ -173,8 +184,8 @@ impl<T: Number> Weights<T> {
 pub(super) fn ratio<T: Number>(places: &Places<T>, [a, b]: [usize; 2]) -> T {
     let r = minus(&places.centres[a], &places.centres[b]);
     let distance = length(&r);
-    match distance.re() > 0.0 {
-        true => (places.radii[a] + places.radii[b]) / distance,
-        false => T::from(f64::MAX),
+    match distance.value() > 0.0 {
+        true => (places.radii[a] + places.radii[b]) * distance.inverse(),
+        false => T::constant(f64::MAX),
     }
 }

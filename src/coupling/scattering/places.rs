@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, point_velocity};
-use crate::adjoint::multipole::Number;
+use crate::adjoint::multipole::{Arithmetic, Number};
 use crate::coupling::reduced::ReducedBody;
 use num_dual::Dual64;
 use std::sync::Arc;
@@ -10,15 +10,18 @@ use std::sync::Arc;
 /// A vector of numbers that may carry derivatives.
 pub(super) type Triple<T> = [T; 3];
 
-pub(super) fn minus<T: Number>(a: &Triple<T>, b: &Triple<T>) -> Triple<T> {
+#[inline(always)]
+pub(super) fn minus<T: Arithmetic>(a: &Triple<T>, b: &Triple<T>) -> Triple<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-pub(super) fn dot<T: Number>(a: &Triple<T>, b: &Triple<T>) -> T {
+#[inline(always)]
+pub(super) fn dot<T: Arithmetic>(a: &Triple<T>, b: &Triple<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(super) fn cross<T: Number>(a: &Triple<T>, b: &Triple<T>) -> Triple<T> {
+#[inline(always)]
+pub(super) fn cross<T: Arithmetic>(a: &Triple<T>, b: &Triple<T>) -> Triple<T> {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -27,7 +30,8 @@ pub(super) fn cross<T: Number>(a: &Triple<T>, b: &Triple<T>) -> Triple<T> {
 }
 
 /// Adds `factor` times a vector.
-pub(super) fn add<T: Number>(out: &mut Triple<T>, factor: T, x: &Triple<T>) {
+#[inline(always)]
+pub(super) fn add<T: Arithmetic>(out: &mut Triple<T>, factor: T, x: &Triple<T>) {
     for (out, x) in out.iter_mut().zip(x) {
         *out += *x * factor;
     }
@@ -36,18 +40,17 @@ pub(super) fn add<T: Number>(out: &mut Triple<T>, factor: T, x: &Triple<T>) {
 /// All places in the world.
 pub(super) struct Places<T> {
     /// Points of all bodies, one body after the other.
-    pub points: Vec<Triple<T>>,
+    pub points: [Vec<T>; 3],
     /// Of the cells: the mean of their bodies' centres.
     pub centres: Vec<Triple<T>>,
     /// Balls about these that hold all points: a little larger, and smooth in the places.
     pub radii: Vec<T>,
     /// Parts of the radii's sums of powers, that their gradient needs.
     sizes: Vec<f64>,
-    unit: f64,
 }
 
-/// The power of the mean that stands for a maximum, and its parts: sixteen is four squarings.
-const POWER: i32 = 16;
+/// The power of the sum that stands for a maximum: 64 equal ones are 7 % too large.
+const POWER: i32 = 64;
 
 impl Places<f64> {
     pub fn new(bodies: &[Arc<ReducedBody>], sizes: &[f64], cells: &Cells, poses: &[Pose]) -> Self {
@@ -58,7 +61,7 @@ impl Places<f64> {
             own.map(move |x| of(pose.apply(x)))
         });
         let centres = at.map(|(body, pose)| of(pose.apply(&body.parts().centre)));
-        Self::of(points.collect(), &centres.collect::<Vec<_>>(), sizes, cells)
+        Self::of(apart(points), &centres.collect::<Vec<_>>(), sizes, cells)
     }
 }
 
@@ -81,37 +84,41 @@ impl Places<Dual64> {
             own.map(move |x| of(pose.apply(x), z))
         });
         let centres = at.map(|((body, pose), z)| of(pose.apply(&body.parts().centre), z));
-        Self::of(points.collect(), &centres.collect::<Vec<_>>(), sizes, cells)
+        Self::of(apart(points), &centres.collect::<Vec<_>>(), sizes, cells)
     }
 }
 
 impl<T: Number> Places<T> {
-    fn of(points: Vec<Triple<T>>, bodies: &[Triple<T>], sizes: &[f64], cells: &Cells) -> Self {
-        let unit = sizes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    fn of(points: [Vec<T>; 3], bodies: &[Triple<T>], sizes: &[f64], cells: &Cells) -> Self {
         let mut out = Self {
             points,
             centres: Vec::with_capacity(cells.cells.len()),
             radii: Vec::with_capacity(cells.cells.len()),
             sizes: sizes.to_vec(),
-            unit,
         };
         for i in 0..cells.cells.len() {
             let own = cells.bodies(i);
             let centre = match own {
                 [b] => bodies[*b],
                 _ => {
-                    let mut sum = [T::from(0.0); 3];
-                    let one = T::from(1.0 / own.len() as f64);
+                    let mut sum = [T::constant(0.0); 3];
+                    let one = T::constant(1.0 / own.len() as f64);
                     own.iter().for_each(|b| add(&mut sum, one, &bodies[*b]));
                     sum
                 }
             };
             let radius = match own {
-                [b] => T::from(sizes[*b]),
+                [b] => T::constant(sizes[*b]),
                 _ => {
-                    let power = |b: &usize| out.reach(&centre, &bodies[*b], *b).powi(POWER);
-                    let sum = own.iter().fold(T::from(0.0), |sum, b| sum + power(b));
-                    root(sum) * unit
+                    // The unit drops out.
+                    let reaches = own.iter().map(|b| out.reach(&centre, &bodies[*b], *b));
+                    let reaches: Vec<T> = reaches.collect();
+                    let most = reaches.iter().map(|r| r.value()).fold(0.0, f64::max);
+                    let power = |r: &T| (*r * (1.0 / most)).power(POWER);
+                    let sum = reaches
+                        .iter()
+                        .fold(T::constant(0.0), |sum, r| sum + power(r));
+                    root(sum) * most
                 }
             };
             out.centres.push(centre);
@@ -120,32 +127,36 @@ impl<T: Number> Places<T> {
         out
     }
 
-    /// How far body b reaches from a centre, in the largest body's size.
+    /// A point.
+    pub fn point(&self, j: usize) -> Triple<T> {
+        [0, 1, 2].map(|i| self.points[i][j])
+    }
+
+    /// How far body b reaches from a centre.
     fn reach(&self, centre: &Triple<T>, body: &Triple<T>, b: usize) -> T {
-        let arm = minus(body, centre);
-        (length(&arm) + self.sizes[b]) * (1.0 / self.unit)
+        length(&minus(body, centre)) + T::constant(self.sizes[b])
     }
 
     /// Adds to the bodies' centres what cotangents of the cells' centres and radii are there.
     pub fn pull_back(&self, cells: &Cells, centres: &[Triple<T>], radii: &[T]) -> Vec<Triple<T>> {
-        let zero = T::from(0.0);
+        let zero = T::constant(0.0);
         let mut centres = centres.to_vec();
         let mut out = vec![[zero; 3]; cells.leaf.len()];
         for (i, bar) in radii.iter().enumerate() {
             let own = cells.bodies(i);
-            if own.len() < 2 || (bar.re() == 0.0 && *bar == zero) {
+            if own.len() < 2 || *bar == zero {
                 continue;
             }
-            // r = u (Σ eᵇ¹⁶)^(1/16), e the reach in u: ∂r/∂arm = (u e/r)¹⁵ arm/|arm|.
+            // r = (Σ eⁿ)^(1/n), e the reach: ∂r/∂arm = (e/r)ⁿ⁻¹ arm/|arm|.
             for b in own {
                 let at = &self.centres[cells.leaf[*b]];
                 let arm = minus(at, &self.centres[i]);
                 let distance = length(&arm);
-                if distance.re() == 0.0 {
+                if distance.value() == 0.0 {
                     continue;
                 }
-                let part = self.reach(&self.centres[i], at, *b) * self.unit / self.radii[i];
-                let slope = *bar * part.powi(POWER - 1) / distance;
+                let part = self.reach(&self.centres[i], at, *b) * self.radii[i].inverse();
+                let slope = *bar * part.power(POWER - 1) * distance.inverse();
                 add(&mut out[*b], slope, &arm);
                 add(&mut centres[i], -slope, &arm);
             }
@@ -157,26 +168,41 @@ impl<T: Number> Places<T> {
                 0 => [zero; 3],
                 _ => shares[cell.parent],
             };
-            add(&mut share, T::from(1.0 / cell.count as f64), &centres[i]);
+            add(
+                &mut share,
+                T::constant(1.0 / cell.count as f64),
+                &centres[i],
+            );
             shares.push(share);
         }
         for (out, leaf) in out.iter_mut().zip(&cells.leaf) {
-            add(out, T::from(1.0), &shares[*leaf]);
+            add(out, T::constant(1.0), &shares[*leaf]);
         }
         out
     }
 }
 
+/// Vectors as their three coordinates, each by itself.
+fn apart<T: Number>(vectors: impl Iterator<Item = Triple<T>>) -> [Vec<T>; 3] {
+    let mut out = [Vec::new(), Vec::new(), Vec::new()];
+    for x in vectors {
+        for (out, x) in out.iter_mut().zip(x) {
+            out.push(x);
+        }
+    }
+    out
+}
+
 /// |x|, zero without a slope at zero.
 pub(super) fn length<T: Number>(x: &Triple<T>) -> T {
     let square = dot(x, x);
-    match square.re() > 0.0 {
-        true => square.sqrt(),
-        false => T::from(0.0),
+    match square.value() > 0.0 {
+        true => square.root(),
+        false => T::constant(0.0),
     }
 }
 
-/// The sixteenth root.
+/// The root of [`POWER`].
 fn root<T: Number>(x: T) -> T {
-    x.sqrt().sqrt().sqrt().sqrt()
+    (0..POWER.trailing_zeros()).fold(x, |x, _| x.root())
 }

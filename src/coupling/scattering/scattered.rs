@@ -83,7 +83,7 @@ impl Scattering {
         }
         let places = Places::new(&self.bodies, &self.sizes, &self.cells, poses);
         Ok(Scattered {
-            pairs: Pairs::new(&self.cells, &self.refused, &places, &self.levels.apart),
+            pairs: Pairs::new(&self.cells, &self.refused, &places, &self.levels),
             places,
             poses: poses.to_vec(),
             model: self,
@@ -202,7 +202,13 @@ impl Scattered<'_> {
             [v.clone(), column(out)]
         };
         let tolerance = self.model.levels.tolerance;
-        let found = gmres(apply, &column(right.to_vec()), tolerance, ITERATIONS, RESTART);
+        let found = gmres(
+            apply,
+            &column(right.to_vec()),
+            tolerance,
+            ITERATIONS,
+            RESTART,
+        );
         let mut kept = self.kept();
         kept.report.iterations = kept.report.iterations.max(found.iterations);
         kept.report.residual = kept.report.residual.max(found.residual);
@@ -307,7 +313,10 @@ impl Scattered<'_> {
             let each = x.iter().zip(y);
             each.map(|(x, y)| x + sign * y).collect()
         };
-        let (sum, difference) = (self.gradient(&combined(1.0)), self.gradient(&combined(-1.0)));
+        let (sum, difference) = (
+            self.gradient(&combined(1.0)),
+            self.gradient(&combined(-1.0)),
+        );
         let each = sum.iter().zip(&difference);
         each.map(|(s, d)| 0.25 * (s - d)).collect()
     }
@@ -336,6 +345,15 @@ impl Scattered<'_> {
         Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates))
     }
 
+    /// Charges of these twists that answer further potentials with their own.
+    pub(super) fn answering_beside(&self, twists: &DVector<f64>, potentials: &[f64]) -> Vec<f64> {
+        let none = vec![0.0; self.model.mode_count()];
+        let own = self.charges(twists, &none);
+        let mut seen = self.sums().potentials(&own);
+        seen.iter_mut().zip(potentials).for_each(|(x, y)| *x += y);
+        self.charges(twists, &self.scattered(&seen))
+    }
+
     /// Charges that bodies that stand still answer potentials with: L a, a = Lᵀ(ψ + Ĝ L a).
     pub(super) fn answering(&self, potentials: &[f64]) -> Vec<f64> {
         let still = DVector::zeros(6 * self.model.bodies.len());
@@ -355,12 +373,17 @@ impl Scattered<'_> {
     /// M̄ x̄: with each body's own.
     pub fn impulses(&self, answer: &Answer) -> DVector<f64> {
         let mut out = answer.exchanged.clone();
+        self.add_own(&answer.twists, &mut out);
+        out
+    }
+
+    /// Adds each body's own impulses.
+    pub(super) fn add_own(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
         for (b, own) in self.model.own.iter().enumerate() {
             let own: &Mat6 = own;
-            let twist = answer.twists.fixed_rows::<6>(6 * b).into_owned();
+            let twist = twists.fixed_rows::<6>(6 * b).into_owned();
             let mut rows = out.fixed_rows_mut::<6>(6 * b);
             rows += own * twist;
         }
-        out
     }
 }

@@ -7,6 +7,7 @@ use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, cross_motion, exp_matrix};
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings, PanelBoundary};
 use hydrograd::coupling::full::{Full, FullSolver, SolveSettings};
 use hydrograd::coupling::reduced::{Cutoff, Reduced, compress};
+use hydrograd::coupling::scattering::{Apart, Levels, Scattering};
 use hydrograd::coupling::{
     Coupling, Direction, Exclusions, ExtrapolatedPanels, FilmedPanels, Given, Isolated, Linearise,
     PanelCoupled,
@@ -44,6 +45,10 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::panel::filmed::FilmedLinearised::vjp" => |c| all(filmed_panels().iter().map(|s| vjp(s, c))),
         "coupling::panel::filmed::FilmedLinearised::hvp" => |c| all(filmed_panels().iter().map(|s| hvp(s, c))),
         "coupling::reduced::linearised::ReducedLinearised::gradient" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| gradient(s, c))),
+        "coupling::scattering::linearised::ScatteredLinearised::gradient" => |c| all(scattering_systems().iter().map(|s| gradient(s, c))),
+        "coupling::scattering::linearised::ScatteredLinearised::gradient_along" => |c| all(scattering_systems().iter().map(|s| gradient_along(s, c))),
+        "coupling::scattering::linearised::ScatteredLinearised::vjp" => |c| all(scattering_systems().iter().map(|s| vjp(s, c))),
+        "coupling::scattering::linearised::ScatteredLinearised::hvp" => |c| all(scattering_systems().iter().map(|s| hvp(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::gradient_along" => |c| gradient_along(&extrapolated_panels(), c),
         "coupling::reduced::linearised::ReducedLinearised::gradient_along" => |c| all(reduced_systems().iter().chain(&film_systems()).map(|s| gradient_along(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedLinearised::vjp" => |c| vjp(&extrapolated_panels(), c),
@@ -195,6 +200,20 @@ pub(super) fn reduced_systems() -> Vec<Reduced> {
         of(&[], fading(0.9, 1.6)),
         of(&[WALL], fading(0.8, 2.9)),
     ]
+}
+
+/// Two bodies that see each other by their points, by moments, and by both.
+pub(super) fn scattering_systems() -> Vec<Scattering> {
+    let bodies = reduced_systems()[0].reduced_bodies().to_vec();
+    let of = |sure: f64, most: f64| {
+        let levels = Levels {
+            bodies: Apart { sure, most },
+            ..Levels::for_accuracy(1e-3).unwrap()
+        };
+        let names = vec!["a".to_string(), "b".to_string()];
+        Scattering::new(bodies.clone(), names, &poses(), levels).unwrap()
+    };
+    vec![of(0.01, 0.02), of(5.0, 6.0), of(0.3, 1.5)]
 }
 
 /// Panels that come nearer than they resolve: to one another and to a wall, round ones and with edges, on one mesh and on two, by blocks and by the whole matrix.

@@ -22,6 +22,7 @@ mod pressure;
 mod pressure_films;
 mod reduced;
 mod refine;
+mod scattering;
 mod sensors;
 mod several_pieces;
 mod shape_slopes;

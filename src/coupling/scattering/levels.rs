@@ -4,7 +4,9 @@ use super::Apart;
 use crate::{Error, Result};
 
 /// Relative residual at which solves end: what gradients are held against is finer than any level.
-const TOLERANCE: f64 = 1e-11;
+const TOLERANCE: f64 = 1e-10;
+/// Of the ratio from which on moments don't stand for points, the part up to which they do so alone.
+const SURE: f64 = 0.9;
 
 /// Levels of the exchange between many bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,33 +34,24 @@ impl Levels {
                 "a number between 0 and 1, such as 0.01",
             ));
         }
-        // Two dipoles whose points reach half way to each other's are worth an eighth of what is left of each degree more.
-        let degree = match accuracy {
-            a if a >= 0.02 => 3,
-            a if a >= 5e-3 => 4,
-            a if a >= 1e-3 => 6,
-            a if a >= 1e-4 => 8,
-            _ => 10,
+        let (degree, bodies, cells) = match accuracy {
+            a if a >= 0.03 => (4, 0.4, 0.5),
+            a if a >= 0.01 => (5, 0.4, 0.5),
+            a if a >= 3e-3 => (6, 0.4, 0.5),
+            a if a >= 1e-3 => (7, 0.4, 0.5),
+            a if a >= 3e-4 => (8, 0.4, 0.45),
+            a if a >= 1e-4 => (9, 0.4, 0.45),
+            _ => (10, 0.35, 0.4),
         };
-        let env = |n: &str, d: f64| {
-            std::env::var(n)
-                .ok()
-                .and_then(|x| x.parse().ok())
-                .unwrap_or(d)
+        let apart = |most: f64| Apart {
+            sure: SURE * most,
+            most,
         };
-        let degree = env("DEG", degree as f64) as usize;
-        let most = env("THETA", 0.4);
         Ok(Self {
             degree,
-            bodies: Apart {
-                sure: 0.9 * most,
-                most,
-            },
-            cells: Apart {
-                sure: 0.9 * env("THETA2", 0.5),
-                most: env("THETA2", 0.5),
-            },
-            tolerance: env("TOL", TOLERANCE),
+            bodies: apart(bodies),
+            cells: apart(cells),
+            tolerance: TOLERANCE,
         })
     }
 

@@ -1,7 +1,8 @@
 //! Many bodies at some poses: charges and impulses for twists, or for what recoils.
 
 use super::Scattering;
-use super::pairs::Pairs;
+use super::near::Distances;
+use super::pairs::{Near, Pairs};
 use super::places::Places;
 use super::sums::{Gradient, Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
@@ -53,6 +54,7 @@ pub struct Scattered<'a> {
     pub(super) poses: Vec<Pose>,
     pub(super) pairs: Pairs,
     places: Places<f64>,
+    known: Distances,
     pub(super) motions: Box<dyn Motions + 'a>,
     kept: Mutex<Kept>,
 }
@@ -82,8 +84,10 @@ impl Scattering {
             ));
         }
         let places = Places::new(&self.bodies, &self.sizes, &self.cells, poses);
+        let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
         Ok(Scattered {
-            pairs: Pairs::new(&self.cells, &self.refused, &places, &self.levels),
+            known: Distances::new(&pairs.near, &self.points, &places),
+            pairs,
             places,
             poses: poses.to_vec(),
             model: self,
@@ -121,7 +125,15 @@ impl Scattered<'_> {
         match self.kept().failed {
             None => Ok(()),
             Some((iterations, residual)) => Err(Error::Solver {
-                what: "exchange between many bodies".into(),
+                what: match self.nearest() {
+                    Some([a, b]) => format!(
+                        "exchange between {} bodies, nearest to each other {:?} and {:?}",
+                        self.model.names.len(),
+                        self.model.names[a],
+                        self.model.names[b]
+                    ),
+                    None => "exchange between many bodies".into(),
+                },
                 iterations,
                 residual,
                 tolerance: self.model.levels.tolerance,
@@ -132,8 +144,21 @@ impl Scattered<'_> {
         }
     }
 
+    /// The two bodies whose points are nearest to each other against their sizes, of those that are seen point by point.
+    fn nearest(&self) -> Option<[usize; 2]> {
+        let ratio = |near: &Near| {
+            let [a, b] = near.bodies;
+            let centre = |b: usize| self.model.bodies[b].parts().centre;
+            let [x, y] = [a, b].map(|b| self.poses[b].apply(&centre(b)));
+            (self.model.sizes[a] + self.model.sizes[b]) / (x - y).norm()
+        };
+        let pairs = self.pairs.near.iter();
+        let nearest = pairs.max_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+        nearest.map(|near| near.bodies)
+    }
+
     fn sums(&self) -> Sums<'_, f64> {
-        Sums::new(self.model, &self.pairs, &self.places)
+        Sums::new(self.model, &self.pairs, &self.places).knowing(&self.known)
     }
 
     /// [L, Ū]ᵀ ψ of every body: of the modes, and of the twists.

@@ -2,7 +2,7 @@
 
 use super::Scattering;
 use super::far::{self, Moments};
-use super::near::{Charged, NearPart, force_on};
+use super::near::{Charged, Distances, NearPart, force_on};
 use super::pairs::{Far, Near, Pairs, Weights};
 use super::places::{Places, Triple, add, cross, dot, minus};
 use crate::adjoint::lie::Vec6;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Parts in which pairs are summed: the same whatever the number of threads, so that sums are.
-const PARTS: usize = 8;
+const PARTS: usize = 4;
 /// Pairs that aren't worth another thread.
 const FEW: usize = 256;
 
@@ -22,6 +22,8 @@ pub(super) struct Sums<'s, T> {
     pairs: &'s Pairs,
     places: &'s Places<T>,
     weights: Weights<T>,
+    /// Inverse distances of the first near pairs' points.
+    known: Option<&'s Distances>,
 }
 
 /// The energy's gradient: in the charges the potentials that they see, and in the bodies' places spatial wrenches.
@@ -60,9 +62,18 @@ impl<'s, T: Number> Sums<'s, T> {
     pub fn new(model: &'s Scattering, pairs: &'s Pairs, places: &'s Places<T>) -> Self {
         Self {
             weights: pairs.weights(places, &model.levels),
+            known: None,
             model,
             pairs,
             places,
+        }
+    }
+
+    /// The same with inverse distances that are known.
+    pub fn knowing(self, known: &'s Distances) -> Self {
+        Self {
+            known: Some(known),
+            ..self
         }
     }
 
@@ -174,9 +185,11 @@ impl<'s, T: Number> Sums<'s, T> {
             weights: &self.weights,
             charges,
         };
-        let parts = in_parts(&self.pairs.near, |pairs: &[Near]| {
-            charged.part(pairs, forces)
-        });
+        // Forces need the way as well.
+        let known = self.known.filter(|_| !forces);
+        let numbered: Vec<(usize, Near)> = self.pairs.near.iter().copied().enumerate().collect();
+        let part = |pairs: &[(usize, Near)]| charged.part(pairs, forces, known);
+        let parts = in_parts(&numbered, part);
         let mut out = NearPart::zeros(charges.len(), forces);
         parts.into_iter().for_each(|part| out.add(part));
         out

@@ -1,0 +1,381 @@
+//! Many bodies by products alone: against the factor, conserved momenta, gradients, joints, and what is refused.
+
+use crate::support::{mesh, says};
+use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
+use hydrograd::boundary::ExactBoundary;
+use hydrograd::coupling::reduced::{Reduced, ReducedBody, compress};
+use hydrograd::coupling::scattering::{Levels, Scattering};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
+use hydrograd::dynamics::Integrator;
+use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape, Wall, WallSurface};
+use hydrograd::simulate::Exchange;
+use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// The error of what must not succeed.
+fn refusal<T>(made: hydrograd::Result<T>) -> String {
+    made.err()
+        .map_or("nothing was refused".into(), |e| e.to_string())
+}
+
+/// Numbers between −½ and ½, the same on every machine.
+struct Drawn(u64);
+
+impl Drawn {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 33) as f64 / (1u64 << 31) as f64 - 0.5
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::from_fn(|_, _| self.next())
+    }
+}
+
+/// A round and a flat body of largest radius 1, compressed for gaps of about a tenth.
+fn kinds(tolerance: f64) -> [Arc<ReducedBody>; 2] {
+    [[1.0; 3], [1.0, 0.4, 0.7]].map(|axes| {
+        let mesh = mesh(&Shape::ellipsoid(axes), 320);
+        let response = ExactBoundary::new("body", axes, &Pose::identity(), 0.3).unwrap();
+        let settings = compress::CompressSettings {
+            rank: None,
+            tolerance,
+            resolved_gap: Some(0.3),
+        };
+        Arc::new(compress::compress("body", &mesh, &response, &settings, &[]).unwrap())
+    })
+}
+
+/// Bodies of both kinds on a grid with gaps of about `gap`, moved and turned at random.
+fn grid(drawn: &mut Drawn, count: usize, gap: f64) -> Vec<Pose> {
+    let side = (count as f64).cbrt().ceil() as usize;
+    let at = |k: usize| {
+        Vec3::new(
+            (k % side) as f64,
+            (k / side % side) as f64,
+            (k / side / side) as f64,
+        )
+    };
+    let one = |k: usize| {
+        let place = (2.0 + gap) * at(k) + 0.3 * gap * drawn.vector();
+        Pose::new(exp_matrix(&(6.0 * drawn.vector())), place)
+    };
+    (0..count).map(one).collect()
+}
+
+fn both(kinds: &[Arc<ReducedBody>; 2], poses: &[Pose], accuracy: f64) -> (Reduced, Scattering) {
+    let bodies: Vec<_> = (0..poses.len()).map(|b| kinds[b % 2].clone()).collect();
+    let factor = Reduced::new(bodies, &[], |_, _| None).unwrap();
+    let levels = Levels::for_accuracy(accuracy).unwrap();
+    let products = Scattering::of(&factor, poses, levels).unwrap();
+    (factor, products)
+}
+
+/// Largest entry of the difference of two columns of impulses, relative to each body's own.
+fn error(kinds: &[Arc<ReducedBody>; 2], found: &DMatrix<f64>, right: &DMatrix<f64>) -> f64 {
+    let scale = |i: usize| {
+        let parts = kinds[i / 6 % 2].parts();
+        let own = parts.added_mass[(i % 6, i % 6)];
+        own.max(0.01 * parts.volume).sqrt()
+    };
+    let mut worst = 0.0_f64;
+    for (i, (a, b)) in found.row_iter().zip(right.row_iter()).enumerate() {
+        worst = worst.max((a - b).amax() / scale(i));
+    }
+    worst
+}
+
+#[test]
+fn products_meet_the_factor_to_the_accuracy_asked_for() {
+    for accuracy in [0.03, 0.01, 1e-3] {
+        let kinds = kinds(accuracy);
+        let mut worst = 0.0_f64;
+        for seed in 0..6 {
+            let mut drawn = Drawn(seed);
+            let gap = [1.0, 0.5, 0.3][seed as usize % 3];
+            let poses = grid(&mut drawn, 27, gap);
+            let (factor, products) = both(&kinds, &poses, accuracy);
+            // Unit motions of single bodies: columns of M_f.
+            let basis = DMatrix::from_fn(6 * 27, 3, |i, k| {
+                let unit = [0, 6 * 13 + 2, 6 * 20 + 4][k];
+                f64::from(i == unit)
+            });
+            let columns = |coupling: &dyn Coupling| {
+                coupling.evaluate(&poses, &basis).unwrap().momenta().clone()
+            };
+            let scaled = |mut m: DMatrix<f64>| {
+                for (mut column, i) in m.column_iter_mut().zip([0, 6 * 13 + 2, 6 * 20 + 4]) {
+                    let parts = kinds[i / 6 % 2].parts();
+                    let own = parts.added_mass[(i % 6, i % 6)].max(0.01 * parts.volume);
+                    column /= own.sqrt();
+                }
+                m
+            };
+            let (found, right) = (scaled(columns(&products)), scaled(columns(&factor)));
+            worst = worst.max(error(&kinds, &found, &right));
+        }
+        println!("accuracy {accuracy:.0e}: error {worst:.1e} of the added mass");
+        assert!(worst < 0.5 * accuracy, "accuracy {accuracy}: {worst:e}");
+        assert!(worst > 1e-12, "nothing was left out at all");
+    }
+}
+
+#[test]
+fn wrenches_add_up_to_nothing_and_are_slopes_of_the_energy() {
+    let kinds = kinds(0.01);
+    let mut drawn = Drawn(5);
+    let poses = grid(&mut drawn, 27, 0.4);
+    let (_, products) = both(&kinds, &poses, 0.01);
+    let twists = DVector::from_fn(6 * 27, |_, _| drawn.next());
+    let basis = DMatrix::from_columns(&[twists.clone()]);
+    let one = DVector::from_element(1, 1.0);
+    let at = products.linearise(&poses, &basis).unwrap();
+    let wrenches = at.gradient(&one, &one).unwrap();
+    let total: Vec6 = wrenches.iter().sum();
+    let largest = wrenches.iter().map(Vec6::amax).fold(0.0, f64::max);
+    println!("total wrench {:.1e} of the largest", total.amax() / largest);
+    // Torques are about the world's origin: arms of twelve radii.
+    assert!(total.amax() < 1e-12 * largest);
+    let z: Vec<Vec6> = (0..27)
+        .map(|_| Vec6::from_fn(|_, _| drawn.next()))
+        .collect();
+    let energy = |h: f64| {
+        let moved: Vec<Pose> = poses
+            .iter()
+            .zip(&z)
+            .map(|(p, z)| p.displace(&(h * z)))
+            .collect();
+        twists.dot(
+            &products
+                .evaluate(&moved, &basis)
+                .unwrap()
+                .momenta()
+                .column(0),
+        )
+    };
+    let h = 1e-3;
+    let slope = (8.0 * (energy(h) - energy(-h)) - energy(2.0 * h) + energy(-2.0 * h)) / (12.0 * h);
+    let found: f64 = wrenches.iter().zip(&z).map(|(w, z)| w.dot(z)).sum();
+    println!("slope {found:.9e}, by differences {slope:.9e}");
+    assert!((found - slope).abs() < 1e-7 * slope.abs());
+    // The rate of the wrenches, by differences of them.
+    let tangent = at
+        .hvp(Direction::Twist(&twists), Direction::Twist(&twists), &z)
+        .unwrap();
+    let along = |h: f64| -> Vec<Vec6> {
+        let moved: Vec<Pose> = poses
+            .iter()
+            .zip(&z)
+            .map(|(p, z)| p.displace(&(h * z)))
+            .collect();
+        products
+            .linearise(&moved, &basis)
+            .unwrap()
+            .gradient(&one, &one)
+            .unwrap()
+    };
+    let sides = [along(h), along(-h), along(2.0 * h), along(-2.0 * h)];
+    let size = tangent.wrench.iter().map(Vec6::amax).fold(0.0, f64::max);
+    for (b, found) in tangent.wrench.iter().enumerate() {
+        let by = (8.0 * (sides[0][b] - sides[1][b]) - sides[2][b] + sides[3][b]) / (12.0 * h);
+        assert!((found - by).amax() < 1e-6 * size, "body {b}: {found} {by}");
+    }
+}
+
+/// Spheres and ellipsoids, free, moving at random.
+fn swarm(count: usize, gap: f64, density: f64) -> Scene {
+    let mut drawn = Drawn(11);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let mut v = Vec::new();
+    for (k, pose) in grid(&mut drawn, count, gap).iter().enumerate() {
+        let shape = match k % 2 {
+            0 => Shape::sphere(0.1),
+            _ => Shape::ellipsoid([0.1, 0.05, 0.08]),
+        };
+        let place = 0.1 * pose.translation;
+        scene.add(
+            Body::new(shape.faces(320))
+                .density(density)
+                .at([place.x, place.y, place.z]),
+        );
+        v.extend((0..6).map(|_| 0.4 * drawn.next()));
+    }
+    scene.initial.v = v;
+    scene
+}
+
+fn settings(exchange: Exchange, integrator: Integrator) -> Settings {
+    Settings::default()
+        .fidelity(Fidelity::Reduced)
+        .exchange(exchange)
+        .integrator(integrator)
+        .accuracy(0.01)
+        .films(false)
+        .time_step(0.01)
+}
+
+#[test]
+fn rollouts_agree_keep_momentum_and_have_gradients() {
+    let scene = swarm(12, 0.6, 1300.0);
+    let steps = 4;
+    let run = |exchange| {
+        let simulator = Simulator::new(&scene, settings(exchange, Integrator::Rk2)).unwrap();
+        let controls = Controls::zeros(&simulator, steps);
+        simulator.rollout(&controls).unwrap()
+    };
+    let (products, factor) = (run(Exchange::Products), run(Exchange::Factor));
+    let [first, last] = [0, steps].map(|k| products.samples()[k].clone());
+    let kept = (last.momentum - first.momentum).amax() / first.largest_momentum.amax();
+    println!("momentum kept to {kept:.1e} of the largest");
+    assert!(kept < 1e-12);
+    let change = |r: &hydrograd::Rollout| &r.samples()[steps].v - &r.samples()[0].v;
+    let (found, right) = (change(&products), change(&factor));
+    let error = (&found - &right).norm() / right.norm();
+    println!("accelerations differ by {error:.1e} of their norm");
+    assert!(error < 0.01);
+
+    // Gradients with respect to where and how fast bodies start, against differences along random directions.
+    let mut drawn = Drawn(3);
+    let simulator = products.simulator();
+    let weights = DVector::from_fn(found.len(), |_, _| drawn.next());
+    let loss = |q: &DVector<f64>, v: &DVector<f64>| {
+        let state = simulator.state(0, q, v).unwrap();
+        let controls = Controls::zeros(simulator, steps);
+        let rollout = simulator
+            .rollout_from(&state, &controls, |_| std::ops::ControlFlow::Continue(()))
+            .unwrap();
+        weights.dot(&rollout.samples()[steps].v)
+    };
+    let start = products.samples()[0].clone();
+    // w (v − t)² with the target half a unit below the end has the slope w there.
+    let target = |i: usize| objective::final_velocity(i, last.v[i] - 0.5, weights[i]);
+    let loss_at_end = (1..weights.len()).fold(target(0), |sum, i| sum + target(i));
+    let gradient = products.gradient(&loss_at_end).unwrap();
+    let h = 1e-4;
+    let mut worst = 0.0_f64;
+    for _ in 0..6 {
+        let dv = DVector::from_fn(start.v.len(), |_, _| drawn.next());
+        let by = (8.0
+            * (loss(&start.q, &(&start.v + h * &dv)) - loss(&start.q, &(&start.v - h * &dv)))
+            - loss(&start.q, &(&start.v + 2.0 * h * &dv))
+            + loss(&start.q, &(&start.v - 2.0 * h * &dv)))
+            / (12.0 * h);
+        let found = gradient.initial.v.dot(&dv);
+        worst = worst.max((found - by).abs() / by.abs().max(0.1 * gradient.initial.v.norm()));
+    }
+    println!("gradients agree with differences to {worst:.1e}");
+    assert!(worst < 1e-6);
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let scene = swarm(20, 0.5, 1100.0);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let settings = settings(Exchange::Products, Integrator::Rk2);
+            let simulator = Simulator::new(&scene, settings).unwrap();
+            let controls = Controls::zeros(&simulator, 2);
+            let rollout = simulator.rollout(&controls).unwrap();
+            let gradient = rollout
+                .gradient(&objective::final_velocity(0, 0.0, 1.0))
+                .unwrap();
+            (rollout.samples()[2].v.clone(), gradient.initial.q.clone())
+        })
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(5));
+}
+
+#[test]
+fn chains_with_driven_joints_and_excluded_pairs_agree() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for k in 0..3 {
+        let at = [0.0, 0.35 * f64::from(k), 0.0];
+        let link = || Body::new(Shape::ellipsoid([0.12, 0.04, 0.08]).faces(320)).density(1000.0);
+        scene.add(link().named(format!("front {k}")).at(at));
+        let joint = Joint::Revolute {
+            axis: [0.0, 0.0, 1.0],
+        };
+        let mut tail = link()
+            .named(format!("tail {k}"))
+            .at([0.22, 0.0, 0.0])
+            .joint(joint);
+        tail.parent = Some(format!("front {k}"));
+        tail = tail.overlaps_parent().actuated();
+        scene.add(tail);
+    }
+    let run = |exchange| {
+        let simulator = Simulator::new(&scene, settings(exchange, Integrator::Rk4)).unwrap();
+        let controls = DMatrix::from_fn(3, 5, |i, _| [0.3, -0.2, 0.1][i]);
+        let controls = Controls::from_matrix(&simulator, controls).unwrap();
+        let rollout = simulator.rollout(&controls).unwrap();
+        rollout.samples()[5].v.clone()
+    };
+    let (found, right) = (run(Exchange::Products), run(Exchange::Factor));
+    let error = (&found - &right).norm() / right.norm();
+    println!("velocities of driven chains differ by {error:.1e}");
+    assert!(error < 1e-3);
+}
+
+#[test]
+fn what_isnt_there_is_refused_by_name() {
+    let mut scene = swarm(2, 1.0, 1200.0);
+    scene.walls.push(Wall {
+        surface: WallSurface::Rigid,
+        point: [0.0, 0.0, -1.0],
+        normal: [0.0, 0.0, 1.0],
+    });
+    let refused = Simulator::new(&scene, settings(Exchange::Products, Integrator::Rk2));
+    says(refusal(refused), &["walls", "exchange", "factor"]);
+    let poses = vec![Pose::identity()];
+    let kinds = kinds(0.03);
+    let levels = Levels::for_accuracy(0.01).unwrap();
+    let one = || vec![kinds[0].clone()];
+    says(
+        refusal(Scattering::new(one(), Vec::new(), &poses, levels)),
+        &["names", "1"],
+    );
+    let bad = Pose::new(poses[0].rotation, Vec3::new(f64::NAN, 0.0, 0.0));
+    let named = vec!["shoal".to_string()];
+    says(
+        refusal(Scattering::new(one(), named, &[bad], levels)),
+        &["shoal", "finite"],
+    );
+    says(refusal(Levels::for_accuracy(0.0)), &["accuracy", "0.01"]);
+    let pair = both(&kinds, &grid(&mut Drawn(1), 2, 1.0), 0.01).1;
+    says(
+        refusal(pair.excluding(&Exclusions::new([(0, 7)]))),
+        &["(0, 7)"],
+    );
+}
+
+#[test]
+fn bodies_in_one_another_are_an_error_not_a_number() {
+    let kinds = kinds(0.03);
+    let (_, products) = both(&kinds, &grid(&mut Drawn(2), 8, 0.5), 0.01);
+    let mut poses = grid(&mut Drawn(2), 8, 0.5);
+    poses[3] = Pose::new(
+        poses[4].rotation,
+        poses[4].translation + Vec3::new(0.05, 0.0, 0.0),
+    );
+    let basis = DMatrix::from_fn(48, 1, |i, _| f64::from(i % 6 == 0));
+    match products.evaluate(&poses, &basis) {
+        Err(error) => {
+            let told = error.to_string();
+            assert!(
+                told.contains("nearer than") && told.contains("body"),
+                "{told}"
+            );
+        }
+        Ok(found) => assert!(found.momenta().iter().all(|x| x.is_finite())),
+    }
+}

@@ -31,6 +31,7 @@ mod shape;
 mod surface;
 mod surface_back;
 mod tensor;
+mod together;
 
 pub use exclude::Exclusions;
 pub use given::Given;
@@ -40,6 +41,7 @@ pub use response::{CoupledResponse, Reached};
 pub use shape::{ShapeDirection, ShapeTerm};
 pub use surface::{FilmLoad, Motion, MotionBar, SurfacePotential};
 pub use tensor::PairTensor;
+pub use together::{SceneSize, Together, TogetherReport};
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
@@ -74,6 +76,15 @@ pub trait Coupling: Send + Sync {
     /// nobody need ask for its products with a basis. `None` where bodies feel each other or a wall.
     fn apart(&self) -> Option<&[Mat6]> {
         None
+    }
+
+    /// Seats for up to `scenes` equal scenes that are simulated side by side, whose basis has `columns` columns; `None` of a fidelity, or of scenes, that gain
+    /// nothing by it.
+    ///
+    /// # Errors
+    /// A device that fails.
+    fn together(&self, _scenes: usize, _columns: usize) -> Result<Option<Arc<dyn Together>>> {
+        Ok(None)
     }
 
     /// Number of shape parameters that it was made with ([`ShapeDirection`]): their order is that of what [`Linearised::shape_vjp`] tells.

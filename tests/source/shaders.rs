@@ -22,6 +22,7 @@ fn settings(shader: &Shader) -> Vec<Vec<(&'static str, Constant)>> {
     for name in shader.constants() {
         let values = match name {
             "COLUMNS" => vec![Constant::Number(1), Constant::Number(12)],
+            "LANES" => vec![Constant::Number(64), Constant::Number(256)],
             "LEFT" if shader.name.ends_with("_hvp") => {
                 vec![Constant::Number(1), Constant::Number(2)]
             }

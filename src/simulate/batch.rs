@@ -4,6 +4,7 @@ use super::{Controls, Cotangents, Gradient, Halted, Objective, Rollout, Simulato
 use crate::coupling::{Together, TogetherReport};
 use crate::dynamics::State;
 use crate::{Error, Result};
+use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -17,11 +18,22 @@ const STACK: usize = 4 << 20;
 /// How often a thread of the pool looks whether others are done while it does the pool's work.
 const LOOK: Duration = Duration::from_micros(200);
 
+/// Where a member of a batch begins.
+#[derive(Clone, Debug)]
+pub enum Begin {
+    /// Where the scene does.
+    Scene,
+    /// At coordinates and generalised velocities ([`Simulator::state`]).
+    At(DVector<f64>, DVector<f64>),
+    /// In a state.
+    State(State),
+}
+
 /// One rollout of a batch.
 #[derive(Clone, Debug)]
 pub struct Member {
     /// Where it begins.
-    pub state: State,
+    pub begin: Begin,
     /// Its open-loop controls.
     pub controls: Controls,
 }
@@ -64,8 +76,21 @@ impl Simulator {
         progress: impl Fn() -> ControlFlow<()> + Sync,
     ) -> Result<(Vec<std::result::Result<Rollout, Box<Halted>>>, BatchReport)> {
         self.side_by_side(members.len(), |simulator, m| {
-            let Member { state, controls } = &members[m];
-            let made = simulator.rollout_here(state, controls, |_| progress());
+            let Member { begin, controls } = &members[m];
+            let state = match begin {
+                Begin::Scene => simulator.initial(),
+                Begin::At(q, v) => simulator.state(0, q, v),
+                Begin::State(state) => Ok(state.clone()),
+            };
+            let made = match state {
+                Ok(state) => simulator.rollout_here(&state, controls, |_| progress()),
+                Err(error) => Err(Box::new(Halted {
+                    step: 0,
+                    time: 0.0,
+                    error,
+                    rollout: None,
+                })),
+            };
             // What is asked later is asked of this simulator, for the seat is another's then.
             let own = |mut rollout: Rollout| {
                 rollout.simulator = self.clone();

@@ -8,7 +8,7 @@ use hydrograd::coupling::reduced::Reduced;
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise, Linearised};
 use hydrograd::gpu::Context;
 use hydrograd::gpu::reduced::GpuReduced;
-use hydrograd::simulate::{Backend, Cotangents, Member};
+use hydrograd::simulate::{Backend, Begin, Cotangents, Member};
 use hydrograd::{Controls, Fidelity, Gradient, Rollout, Scene, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
@@ -125,7 +125,7 @@ fn members(simulator: &Simulator, count: usize) -> Vec<Member> {
         let pushes = wavy(size * steps, 1.7 + m as f64);
         let pushes = 300.0 * DMatrix::from_vec(size, steps, pushes);
         Member {
-            state: simulator.state(0, &q, &v).unwrap(),
+            begin: Begin::At(q, v),
             controls: Controls::from_matrix(simulator, pushes).unwrap(),
         }
     };
@@ -216,7 +216,9 @@ fn a_member_that_fails_takes_no_other_along() {
     let mut all = members(&gpu, 5);
     let right: Vec<Vec<f64>> = rollouts(&gpu, &all).iter().map(states).collect();
     // The finger goes through the coin and out of the world.
-    all[2].state.y[1] = 1e9;
+    let (q, mut v) = (gpu.start().0.clone(), gpu.start().1.clone());
+    v[1] = 1e8;
+    all[2].begin = Begin::At(q, v);
     // Controls of another scene.
     all[4].controls = {
         let mut other = Scene::new(hydrograd::Fluid::fresh_water());

@@ -318,7 +318,15 @@ impl Simulator {
             // In order, so that each stands in its own place.
             for (b, error) in refused {
                 let (step, time, rollout) = (0, 0.0, None);
-                made.insert(b, Err(Box::new(Halted { step, time, error, rollout })));
+                made.insert(
+                    b,
+                    Err(Box::new(Halted {
+                        step,
+                        time,
+                        error,
+                        rollout,
+                    })),
+                );
             }
             Ok(made)
         })?;

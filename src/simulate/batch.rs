@@ -29,6 +29,9 @@ pub enum Begin {
     State(State),
 }
 
+/// What became of a member: its rollout, or where it ended and why.
+pub type Ran = std::result::Result<Rollout, Box<Halted>>;
+
 /// One rollout of a batch.
 #[derive(Clone, Debug)]
 pub struct Member {
@@ -74,7 +77,7 @@ impl Simulator {
         &self,
         members: &[Member],
         progress: impl Fn() -> ControlFlow<()> + Sync,
-    ) -> Result<(Vec<std::result::Result<Rollout, Box<Halted>>>, BatchReport)> {
+    ) -> Result<(Vec<Ran>, BatchReport)> {
         self.side_by_side(members.len(), |simulator, m| {
             let Member { begin, controls } = &members[m];
             let state = match begin {

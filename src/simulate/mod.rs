@@ -46,7 +46,7 @@ mod trajectory;
 mod which;
 
 pub use allocation::Allocation;
-pub use batch::{BatchReport, Begin, Member};
+pub use batch::{BatchReport, Begin, Member, Ran};
 pub use checkpoint::Checkpoint;
 pub use controls::Controls;
 pub use equations::Equations;

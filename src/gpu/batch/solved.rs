@@ -13,6 +13,9 @@ use crate::gpu::units::{Twists, motions, size, spatial};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+/// Momenta of columns, and the wrenches of each.
+type Responses = (DMatrix<f64>, Vec<Vec<Vec6>>);
+
 /// [`Seat`] solved for a basis.
 pub(super) struct SolvedTogether<'a> {
     seat: &'a Seat,
@@ -112,11 +115,7 @@ impl<'a> SolvedTogether<'a> {
     }
 
     /// Some columns' momenta, and their wrenches with a combination of the basis; `None` where the device doesn't solve them.
-    fn respond_with(
-        &self,
-        twists: &DMatrix<f64>,
-        x: &DVector<f64>,
-    ) -> Result<Option<(DMatrix<f64>, Vec<Vec<Vec6>>)>> {
+    fn respond_with(&self, twists: &DMatrix<f64>, x: &DVector<f64>) -> Result<Option<Responses>> {
         let model = &self.seat.group.model;
         let twists = Twists::new(twists.clone(), model.length);
         let (n, bodies) = (twists.all.ncols(), model.sizes.bodies);

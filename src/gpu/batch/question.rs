@@ -4,7 +4,7 @@ use super::model::{Model, STEPS};
 use crate::coupling::SceneSize;
 use crate::gpu::buffer::Buffer;
 use crate::gpu::kernel::Call;
-use crate::gpu::source::Constant;
+use crate::gpu::source::{Arithmetic, Constant};
 use crate::{Error, Result};
 
 /// Questions of one kind go to the device together.
@@ -135,13 +135,17 @@ impl Prepared {
         let wrenches = reals("wrenches", lengths.wrenches)?;
         let number = |n: usize| Constant::Number(n as u32);
         let columns = kind.columns(&model.sizes);
-        let call = |shader, wide: usize, inputs: &Buffer, answers: &Buffer| {
+        let fine = context.fine();
+        let call = |shader: (&'static str, &'static str, Arithmetic),
+                    wide: usize,
+                    inputs: &Buffer,
+                    answers: &Buffer| {
             let mut constants = vec![
                 ("LANES", number(model.lanes)),
                 ("COLUMNS", number(columns)),
                 ("WIDE", number(wide)),
             ];
-            if shader == "batch_solve" {
+            if shader.0 == "batch_solve" {
                 constants.push(("PLACE", Constant::Flag(kind.places())));
             }
             let buffers = [
@@ -153,21 +157,40 @@ impl Prepared {
                 ("rough", &shared.rough),
                 ("answers", answers),
             ];
-            let shader = (shader, "main", context.fine());
             context.call(shader, &constants, &[], (&model.table, &buffers), [0; 3])
         };
         let wide = kind.wide(&model.sizes);
         let calls = match kind {
-            Kind::Value => vec![call("batch_solve", wide, &inputs, &answers)?],
+            Kind::Value => vec![call(
+                ("batch_solve", "main", fine),
+                wide,
+                &inputs,
+                &answers,
+            )?],
             Kind::Basis => vec![
-                call("batch_solve", wide, &inputs, &answers)?,
-                call("batch_pull", columns, &directions, &wrenches)?,
+                call(("batch_solve", "main", fine), wide, &inputs, &answers)?,
+                call(
+                    ("batch_pull", "main", fine),
+                    columns,
+                    &directions,
+                    &wrenches,
+                )?,
             ],
             Kind::Respond(_) => vec![
-                call("batch_solve", wide, &inputs, &answers)?,
-                call("batch_pull", columns + 1, &directions, &wrenches)?,
+                call(("batch_solve", "main", fine), wide, &inputs, &answers)?,
+                call(
+                    ("batch_pull", "main", fine),
+                    columns + 1,
+                    &directions,
+                    &wrenches,
+                )?,
             ],
-            Kind::Tangent(_) => vec![call("batch_tangent", wide, &inputs, &answers)?],
+            Kind::Tangent(_) => vec![call(
+                ("batch_tangent", "main", fine),
+                wide,
+                &inputs,
+                &answers,
+            )?],
         };
         Ok(Self {
             lengths,

@@ -12,10 +12,13 @@ pub trait Together: Send + Sync {
     /// How many seats there are.
     fn seats(&self) -> usize;
 
-    /// The coupling of a seat, which is taken from the start on.
-    fn seat(&self, seat: usize) -> Arc<dyn Coupling>;
+    /// The coupling of all of them: it asks from the seat that its thread sits at, and answers by itself where that has none.
+    fn coupling(&self) -> Arc<dyn Coupling>;
 
-    /// Nobody asks from this seat any more.
+    /// This thread sits down. Every seat counts as taken from the start on, whether or not somebody has sat down yet.
+    fn sit(&self, seat: usize);
+
+    /// Nobody asks from this seat any more; called by whoever sits there.
     fn leave(&self, seat: usize);
 
     /// What was done so far.

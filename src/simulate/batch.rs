@@ -204,10 +204,11 @@ fn seated<T: Send>(
     let found: Vec<Mutex<Option<T>>> = (0..members).map(|_| Mutex::default()).collect();
     let next = AtomicUsize::new(0);
     let left = AtomicUsize::new(table.seats());
+    // One for all: its meshes and what else is prepared are large.
+    let own = simulator.with_coupling(table.coupling());
     let sit = |seat: usize| {
-        let coupling = table.seat(seat);
+        table.sit(seat);
         let seated = Seated { table, seat };
-        let own = simulator.with_coupling(coupling);
         loop {
             let m = next.fetch_add(1, Ordering::Relaxed);
             let Some(place) = found.get(m) else {

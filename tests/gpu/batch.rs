@@ -61,7 +61,8 @@ fn holds(context: &Arc<Context>, reduced: &Arc<Reduced>, poses: &[Pose], limit: 
     let (bodies, columns) = (poses.len(), 5);
     let gpu = GpuReduced::new(context, reduced.clone()).unwrap();
     let table = gpu.together(1, columns).unwrap().unwrap();
-    let seat = table.seat(0);
+    table.sit(0);
+    let seat = table.coupling();
     let basis = basis(bodies, columns, 0.3);
     let right = reduced.linearise(poses, &basis).unwrap();
     let found = seat.differentiable().unwrap().linearise(poses, &basis);

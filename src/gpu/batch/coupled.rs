@@ -1,4 +1,4 @@
-//! A seat as a coupling.
+//! All seats as one coupling: whoever asks, asks from the seat of the thread.
 
 use super::question::Kind;
 use super::seat::Seat;
@@ -6,34 +6,61 @@ use super::solved::SolvedTogether;
 use crate::Result;
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
+use crate::coupling::reduced::Reduced;
 use crate::coupling::{
     Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential,
 };
 use nalgebra::DMatrix;
+use std::cell::Cell;
 use std::sync::Arc;
 
-impl Coupling for Seat {
+thread_local! {
+    /// Where this thread sits: threads are a batch's own, and sit at one table at a time.
+    static SEAT: Cell<Option<usize>> = const { Cell::new(None) };
+}
+
+/// This thread sits there now.
+pub(super) fn sit(seat: Option<usize>) {
+    SEAT.set(seat);
+}
+
+/// The fidelity reduced of many equal scenes.
+pub(super) struct Seats {
+    pub seats: Vec<Seat>,
+    pub reduced: Arc<Reduced>,
+}
+
+impl Seats {
+    /// The seat of this thread.
+    fn own(&self) -> Option<&Seat> {
+        self.seats.get(SEAT.get()?)
+    }
+}
+
+impl Coupling for Seats {
     fn name(&self) -> &'static str {
         "the fidelity reduced on the GPU, of many scenes together"
     }
 
     fn bodies(&self) -> usize {
-        self.group.model.sizes.bodies
+        self.reduced.bodies()
     }
 
     fn unknowns(&self) -> usize {
-        self.group.model.sizes.modes
+        self.reduced.unknowns()
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
-        match self.solve(Kind::Value, poses, basis)? {
-            Some((_, found)) => Ok(Momenta::new(found.momenta, found.report)),
-            None => self.group.model.reduced.evaluate(poses, basis),
+        if let Some(seat) = self.own()
+            && let Some((_, found)) = seat.solve(Kind::Value, poses, basis)?
+        {
+            return Ok(Momenta::new(found.momenta, found.report));
         }
+        self.reduced.evaluate(poses, basis)
     }
 
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
-        self.group.model.reduced.film_momenta(poses, twists)
+        self.reduced.film_momenta(poses, twists)
     }
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
@@ -46,10 +73,7 @@ impl Coupling for Seat {
         motion: &Motion,
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
-        self.group
-            .model
-            .reduced
-            .surface_potentials(motion, surfaces)
+        self.reduced.surface_potentials(motion, surfaces)
     }
 
     /// On the CPU.
@@ -59,18 +83,18 @@ impl Coupling for Seat {
         surfaces: &[Arc<PanelBoundary>],
         bars: &[SurfacePotential],
     ) -> Result<MotionBar> {
-        let reduced = &self.group.model.reduced;
-        reduced.surface_potentials_vjp(motion, surfaces, bars)
+        self.reduced.surface_potentials_vjp(motion, surfaces, bars)
     }
 }
 
-impl Linearise for Seat {
+impl Linearise for Seats {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
-        match self.solve(Kind::Basis, poses, basis)? {
-            Some((held, found)) => Ok(Box::new(SolvedTogether::new(
-                self, poses, basis, held, found,
-            ))),
-            None => self.group.model.reduced.linearise(poses, basis),
+        if let Some(seat) = self.own()
+            && let Some((held, found)) = seat.solve(Kind::Basis, poses, basis)?
+        {
+            let solved = SolvedTogether::new(seat, poses, basis, held, found);
+            return Ok(Box::new(solved));
         }
+        self.reduced.linearise(poses, basis)
     }
 }

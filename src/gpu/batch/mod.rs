@@ -27,6 +27,7 @@ use super::context::Context;
 use crate::Result;
 use crate::coupling::reduced::Reduced;
 use crate::coupling::{Coupling, Together, TogetherReport};
+use coupled::{Seats, sit};
 use group::{Group, SLOTS};
 use model::Model;
 use seat::Seat;
@@ -42,8 +43,7 @@ const PARTED: usize = 64;
 /// Seats for equal scenes of compressed bodies on a device.
 pub struct Batch {
     groups: Vec<Arc<Group>>,
-    /// Seats of each group.
-    sizes: Vec<usize>,
+    coupled: Arc<Seats>,
 }
 
 impl Batch {
@@ -76,37 +76,35 @@ impl Batch {
             .filter(|n| *n > 0)
             .collect();
         let made = sizes.iter().map(|n| Ok(Arc::new(Group::new(&model, *n)?)));
-        Ok(Some(Self {
-            groups: made.collect::<Result<_>>()?,
-            sizes,
-        }))
-    }
-
-    /// The group of a seat, and its number there.
-    fn find(&self, seat: usize) -> (usize, usize) {
-        let mut left = seat;
-        for (g, size) in self.sizes.iter().enumerate() {
-            if left < *size {
-                return (g, left);
-            }
-            left -= size;
-        }
-        (0, 0)
+        let groups = made.collect::<Result<Vec<_>>>()?;
+        let seats = groups.iter().zip(&sizes);
+        let seats = seats.flat_map(|(group, n)| (0..*n).map(|k| Seat::new(group, k)));
+        let coupled = Arc::new(Seats {
+            seats: seats.collect(),
+            reduced: reduced.clone(),
+        });
+        Ok(Some(Self { groups, coupled }))
     }
 }
 
 impl Together for Batch {
     fn seats(&self) -> usize {
-        self.sizes.iter().sum()
+        self.coupled.seats.len()
     }
 
-    fn seat(&self, seat: usize) -> Arc<dyn Coupling> {
-        let (group, number) = self.find(seat);
-        Arc::new(Seat::new(&self.groups[group], number))
+    fn coupling(&self) -> Arc<dyn Coupling> {
+        self.coupled.clone()
+    }
+
+    fn sit(&self, seat: usize) {
+        sit(Some(seat));
     }
 
     fn leave(&self, seat: usize) {
-        self.groups[self.find(seat).0].leave();
+        sit(None);
+        if let Some(seat) = self.coupled.seats.get(seat) {
+            seat.group.leave();
+        }
     }
 
     fn report(&self) -> TogetherReport {

@@ -71,19 +71,29 @@ impl Batch {
         if seats == 0 {
             return Ok(None);
         }
-        let sizes: Vec<usize> = (0..groups)
-            .map(|g| (g + 1) * seats / groups - g * seats / groups)
-            .filter(|n| *n > 0)
-            .collect();
-        let made = sizes.iter().map(|n| Ok(Arc::new(Group::new(&model, *n)?)));
+        let mut seats = seats;
+        loop {
+            match Self::of(&model, seats, groups) {
+                // The device has less memory than its buffers may take: fewer sit down at a time.
+                Err(_) if seats > groups && context.check().is_ok() => seats = seats.div_ceil(2),
+                made => return made.map(Some),
+            }
+        }
+    }
+
+    /// So many seats in so many groups.
+    fn of(model: &Arc<Model>, seats: usize, groups: usize) -> Result<Self> {
+        let sizes = (0..groups).map(|g| (g + 1) * seats / groups - g * seats / groups);
+        let sizes: Vec<usize> = sizes.filter(|n| *n > 0).collect();
+        let made = sizes.iter().map(|n| Ok(Arc::new(Group::new(model, *n)?)));
         let groups = made.collect::<Result<Vec<_>>>()?;
         let seats = groups.iter().zip(&sizes);
         let seats = seats.flat_map(|(group, n)| (0..*n).map(|k| Seat::new(group, k)));
         let coupled = Arc::new(Seats {
             seats: seats.collect(),
-            reduced: reduced.clone(),
+            reduced: model.reduced.clone(),
         });
-        Ok(Some(Self { groups, coupled }))
+        Ok(Self { groups, coupled })
     }
 }
 

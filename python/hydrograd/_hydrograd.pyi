@@ -612,11 +612,22 @@ class Simulator:
         v: ArrayLike | None = None,
         progress: _Progress | None = None,
     ) -> list[Rollout]:
-        """Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
+        """Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other. With the backend gpu and the fidelity
+        reduced the couplings of all are computed together: a member is the same, to the bit, whoever runs beside it.
         `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error.
 
         `progress(done, total)` is called with the steps made by all members together, as in `rollout`; what it raises comes out with all of the batch,
         each member as far as it came, as its `members`."""
+    def gradient_batch(
+        self,
+        rollouts: Sequence[Rollout],
+        objective: Objective,
+        *,
+        progress: _Progress | None = None,
+    ) -> list[Gradient]:
+        """Gradients of an `objective` of many rollouts of this simulator, one reverse sweep each, on all cores: those of `Rollout.gradient`, with the backend gpu
+        computed together as `rollout_batch` computes the rollouts. `progress(done, total)` is called with the steps gone back by all of them together; what it raises ends the
+        sweeps and comes out. Ctrl-C ends them."""
     def gradient_in_parts(
         self,
         objective: Objective,

@@ -36,6 +36,11 @@ pub struct Rollout {
 type Numbers<'py> = PyResult<Bound<'py, PyArrayDyn<f64>>>;
 
 impl Rollout {
+    /// What it shows.
+    pub fn shared(&self) -> Arc<hydrograd::Rollout> {
+        self.inner.clone()
+    }
+
     /// A rollout of a simulator.
     pub fn new(simulator: &Bound<'_, Simulator>, inner: hydrograd::Rollout) -> Self {
         Self {

@@ -16,14 +16,13 @@ use crate::scene::Scene;
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
-use hydrograd::simulate::{Checkpoints, Halted, Policy};
+use hydrograd::simulate::{Begin, Checkpoints, Halted, Member, Policy};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -242,7 +241,8 @@ impl Simulator {
         Ok(Rollout::new(slf, made))
     }
 
-    /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other.
+    /// Runs many controls, (batch, steps, control_size), on all cores: the same rollouts, to the bit, as one after the other. With the backend gpu and the fidelity
+    /// reduced the couplings of all are computed together: a member is the same, to the bit, whoever runs beside it.
     /// `q` (batch, q_size) and `v` (batch, v_size) are where each begins, if given. Where some fail, the `BatchError` has what ran and each one's error.
     ///
     /// `progress(done, total)` is called with the steps made by all members together, as in `rollout`; what it raises comes out with all of the batch,
@@ -298,20 +298,37 @@ impl Simulator {
         let mut progress = Progress::new("rollout_batch: progress", progress, batch * steps)?;
         let started = Instant::now();
         let made = followed(py, progress.as_mut(), move |interrupt| {
-            let one = |(start, matrix): (Start, DMatrix<f64>)| {
-                let unmade = |error| {
-                    Box::new(Halted {
-                        step: 0,
-                        time: 0.0,
-                        error,
-                        rollout: None,
-                    })
+            let member = |(start, matrix): (Start, DMatrix<f64>)| {
+                let controls = Controls::from_matrix(&inner, matrix)?;
+                let begin = match start {
+                    Start::Scene => Begin::Scene,
+                    Start::From(q, v) => Begin::At(q, v),
+                    Start::At(state) => Begin::State(state),
                 };
-                let controls = Controls::from_matrix(&inner, matrix).map_err(unmade)?;
-                let state = start.state(&inner).map_err(unmade)?;
-                inner.rollout_as_far(&state, &controls, |_| interrupt.one_more())
+                hydrograd::Result::Ok(Member { begin, controls })
             };
-            Ok(runs.into_par_iter().map(one).collect::<Vec<_>>())
+            let (mut members, mut refused) = (Vec::with_capacity(runs.len()), Vec::new());
+            for (b, run) in runs.into_iter().enumerate() {
+                match member(run) {
+                    Ok(member) => members.push(member),
+                    Err(error) => refused.push((b, error)),
+                }
+            }
+            let (mut made, _) = inner.rollout_batch(&members, || interrupt.one_more())?;
+            // In order, so that each stands in its own place.
+            for (b, error) in refused {
+                let (step, time, rollout) = (0, 0.0, None);
+                made.insert(
+                    b,
+                    Err(Box::new(Halted {
+                        step,
+                        time,
+                        error,
+                        rollout,
+                    })),
+                );
+            }
+            Ok(made)
         })?;
         if let Some(raised) = progress.and_then(|progress| progress.raised) {
             let ran = made
@@ -336,6 +353,38 @@ impl Simulator {
             }
         }
         gathered(slf, made)
+    }
+
+    /// Gradients of an `objective` of many rollouts of this simulator, one reverse sweep each, on all cores: those of `Rollout.gradient`, with the backend gpu
+    /// computed together as `rollout_batch` computes the rollouts. `progress(done, total)` is called with the steps gone back by all of them together; what it raises ends the
+    /// sweeps and comes out. Ctrl-C ends them.
+    #[pyo3(signature = (rollouts, objective, *, progress=None))]
+    fn gradient_batch<'py>(
+        &self,
+        py: Python<'py>,
+        rollouts: Vec<PyRef<'py, Rollout>>,
+        objective: PyRef<'py, Objective>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        use hydrograd::simulate::Objective as _;
+        let all: Vec<_> = rollouts.iter().map(|rollout| rollout.shared()).collect();
+        let steps = all.iter().map(|rollout| rollout.steps()).sum();
+        let (inner, objective) = (self.inner.clone(), objective.0.clone());
+        let mut progress = Progress::new("gradient_batch: progress", progress, steps)?;
+        let made = followed(py, progress.as_mut(), move |interrupt| {
+            let all: Vec<&hydrograd::Rollout> = all.iter().map(Arc::as_ref).collect();
+            let bars = all.iter().map(|rollout| {
+                objective.check(rollout)?;
+                Ok(objective.cotangents(rollout))
+            });
+            let bars = bars.collect::<hydrograd::Result<Vec<_>>>()?;
+            let (made, _) = inner.vjp_batch(&all, &bars, || interrupt.one_more())?;
+            made.into_iter().collect::<hydrograd::Result<Vec<_>>>()
+        });
+        let made = ended(progress, made)?;
+        made.iter()
+            .map(|one| gradient::of_rollout(py, one))
+            .collect()
     }
 
     /// Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is

@@ -51,6 +51,34 @@ def test_a_member_that_cannot_begin_has_nothing(sim):
     assert "overlap" in str(info.value.errors[1])
 
 
+def test_gradients_of_a_batch_are_those_of_its_rollouts(sim):
+    rollouts = sim.rollout_batch(np.zeros((3, 4, 12)), v=speeds([False, True, False]))
+    goal = hg.objective.final_position("right", (0.3, 0.1, 0.0)) + 1e-3 * hg.objective.effort(1.0)
+    found = sim.gradient_batch(rollouts, goal)
+    assert len(found) == 3
+    for one, rollout in zip(found, rollouts):
+        right = rollout.gradient(goal)
+        assert np.array_equal(one.controls, right.controls)
+        assert np.array_equal(one.initial_v, right.initial_v)
+    with pytest.raises(hg.InputError, match="of another simulator"):
+        approaching().gradient_batch(rollouts, goal)
+
+
+def test_a_batch_on_a_gpu_is_the_cpus(sim):
+    try:
+        gpu = hg.Simulator(sim.scene, 0.01, fidelity="reduced", faces=80, films=False, backend="gpu")
+    except hg.DeviceError:
+        pytest.skip("there is no GPU, nor a driver that stands for one")
+    controls, v = np.zeros((5, 3, 12)), speeds([False, True, False, True, False])
+    goal = hg.objective.final_position("right", (0.3, 0.1, 0.0))
+    together = gpu.rollout_batch(controls, v=v)
+    gradients = gpu.gradient_batch(together, goal)
+    for one, gradient, right in zip(together, gradients, sim.rollout_batch(controls, v=v)):
+        assert np.allclose(one.q, right.q, rtol=0.0, atol=1e-11)
+        controls = right.gradient(goal).controls
+        assert np.allclose(gradient.controls, controls, rtol=0.0, atol=1e-9 * np.abs(controls).max())
+
+
 def test_bridges_keep_what_ran(sim):
     from hydrograd import _bridge
 

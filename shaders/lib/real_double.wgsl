@@ -10,6 +10,13 @@ fn mul(a: real, b: real) -> real { return a * b; }
 fn div(a: real, b: real) -> real { return a / b; }
 fn neg(a: real) -> real { return -a; }
 fn root(a: real) -> real { return sqrt(a); }
+// Two steps of Newton's from single precision: a fifth of what a root and a division take.
+fn inverse_root(a: real) -> real {
+    let half = 0.5lf * a;
+    let first = f64(inverseSqrt(f32(a)));
+    let second = first * (1.5lf - half * first * first);
+    return second * (1.5lf - half * second * second);
+}
 fn negative(a: real) -> bool { return a < 0.0lf; }
 fn third() -> real { return 0.3333333333333333lf; }
 fn pi() -> real { return 3.141592653589793lf; }

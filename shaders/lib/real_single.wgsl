@@ -14,6 +14,8 @@ fn mul(a: real, b: real) -> real { return a * b; }
 fn div(a: real, b: real) -> real { return a / b; }
 fn neg(a: real) -> real { return -a; }
 fn root(a: real) -> real { return sqrt(a); }
+// 1/√a.
+fn inverse_root(a: real) -> real { return inverseSqrt(a); }
 fn negative(a: real) -> bool { return a < 0.0; }
 fn third() -> real { return 0.33333334; }
 fn pi() -> real { return 3.1415927; }

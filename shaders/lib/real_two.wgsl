@@ -75,6 +75,12 @@ fn root(a: real) -> real {
     return add(sum, num(rest.x / (2.0 * first)));
 }
 
+// A step of Newton's from single precision doubles its digits.
+fn inverse_root(a: real) -> real {
+    let first = num(inverseSqrt(a.x));
+    let left = sub(num(1.0), mul(a, mul(first, first)));
+    return add(first, mul(first, vec2<f32>(0.5 * left.x, 0.5 * left.y)));
+}
 fn negative(a: real) -> bool { return a.x < 0.0; }
 fn third() -> real { return vec2<f32>(0.33333334, -9.934108e-09); }
 fn pi() -> real { return vec2<f32>(3.1415927, -8.742278e-08); }

@@ -32,6 +32,7 @@ mod shape;
 mod surface;
 mod surface_back;
 mod tensor;
+mod together;
 
 pub use exclude::Exclusions;
 pub use given::Given;
@@ -41,6 +42,7 @@ pub use response::{CoupledResponse, Reached};
 pub use shape::{ShapeDirection, ShapeTerm};
 pub use surface::{FilmLoad, Motion, MotionBar, SurfacePotential};
 pub use tensor::PairTensor;
+pub use together::{SceneSize, Together, TogetherReport};
 
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
@@ -80,6 +82,15 @@ pub trait Coupling: Send + Sync {
     /// The coupling of so many bodies that no matrix of them is formed, of which answers to single directions are asked; `None` of others.
     fn scattering(&self) -> Option<&scattering::Scattering> {
         None
+    }
+
+    /// Seats for up to `scenes` equal scenes that are simulated side by side, whose basis has `columns` columns; `None` of a fidelity, or of scenes, that gain
+    /// nothing by it.
+    ///
+    /// # Errors
+    /// A device that fails.
+    fn together(&self, _scenes: usize, _columns: usize) -> Result<Option<Arc<dyn Together>>> {
+        Ok(None)
     }
 
     /// Number of shape parameters that it was made with ([`ShapeDirection`]): their order is that of what [`Linearised::shape_vjp`] tells.

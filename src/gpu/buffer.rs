@@ -51,7 +51,7 @@ impl Arithmetic {
     }
 
     /// Bytes of numbers.
-    fn bytes(self, values: &[f64]) -> Vec<u8> {
+    pub(super) fn bytes(self, values: &[f64]) -> Vec<u8> {
         let two = |x: f64| [x as f32, (x - f64::from(x as f32)) as f32];
         let single = |x: &f64| (*x as f32).to_ne_bytes();
         match self {
@@ -186,6 +186,19 @@ impl Context {
         Ok(out)
     }
 
+    /// Where the device's times are put, so many bytes.
+    pub(super) fn times(&self, bytes: usize) -> Buffer {
+        let bytes = bytes as u64;
+        let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("times"),
+            size: bytes,
+            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let pool = None;
+        Buffer(Arc::new(Held { raw, bytes, pool }))
+    }
+
     /// The settings of a call: words, floats as their bits.
     pub(super) fn uniform(&self, words: &[usize]) -> Buffer {
         let mut words: Vec<u32> = words.iter().map(|n| *n as u32).collect();
@@ -257,6 +270,72 @@ impl Context {
             out.push(view[at..at + n].to_vec());
             at += padded(*n) as usize;
         }
+        self.pool.count(|c| {
+            c.read_backs += 1;
+            c.bytes_back += total;
+        });
+        Ok(out)
+    }
+
+    /// Starts what is written down, and waits for so many bytes (multiples of 4) of each of some arrays, one behind the other: in memory that is
+    /// kept from one time to the next. What others have started meanwhile isn't waited for.
+    ///
+    /// # Errors
+    /// A fault of the device.
+    pub(super) fn finish_and_read(
+        &self,
+        mut encoder: wgpu::CommandEncoder,
+        parts: &[(&Buffer, usize)],
+        staging: &mut Option<(wgpu::Buffer, u64)>,
+    ) -> Result<Vec<u8>> {
+        self.check()?;
+        let total: u64 = parts.iter().map(|(_, n)| *n as u64).sum();
+        let most = self.limits.max_buffer_size;
+        if total > most {
+            return Err(self.failure(format!(
+                "{total} bytes are to be read back at once, and a buffer holds at most {most}"
+            )));
+        }
+        if staging.as_ref().is_none_or(|(_, size)| *size < total) {
+            let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+            let size = total.next_power_of_two().clamp(16, most);
+            let made = self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read-back"),
+                size,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            if let Some(e) = pollster::block_on(guard.pop()) {
+                return Err(self.failure(format!("reading {total} bytes back: {e}")));
+            }
+            *staging = Some((made, size));
+        }
+        let Some((staging, _)) = staging else {
+            return Ok(Vec::new());
+        };
+        let mut at = 0;
+        for (buffer, n) in parts.iter().filter(|(_, n)| *n > 0) {
+            encoder.copy_buffer_to_buffer(buffer.raw(), 0, staging, at, *n as u64);
+            at += *n as u64;
+        }
+        let submitted = self.queue.submit([encoder.finish()]);
+        let (send, receive) = std::sync::mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, ..total, move |result| {
+            // A receiver that is gone wants nothing.
+            let _ = send.send(result);
+        });
+        let waited = self.device.poll(wgpu::PollType::Wait {
+            submission_index: Some(submitted),
+            timeout: None,
+        });
+        self.check()?;
+        waited.map_err(|e| self.failure(format!("waiting for it failed: {e}")))?;
+        let failed = |e: String| self.failure(format!("reading back failed: {e}"));
+        let mapped = receive.recv().map_err(|e| failed(e.to_string()))?;
+        mapped.map_err(|e| failed(e.to_string()))?;
+        let view = staging.get_mapped_range(..total);
+        let out = view.map_err(|e| failed(e.to_string()))?.to_vec();
+        staging.unmap();
         self.pool.count(|c| {
             c.read_backs += 1;
             c.bytes_back += total;

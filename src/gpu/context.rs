@@ -156,11 +156,10 @@ impl Context {
             max_compute_workgroups_per_dimension: has.max_compute_workgroups_per_dimension,
             ..wgpu::Limits::default()
         };
-        let features = if fine == Arithmetic::Double {
-            wgpu::Features::SHADER_F64
-        } else {
-            wgpu::Features::empty()
-        };
+        let mut features = found.features() & wgpu::Features::TIMESTAMP_QUERY;
+        if fine == Arithmetic::Double {
+            features |= wgpu::Features::SHADER_F64;
+        }
         let asked = found.request_device(&wgpu::DeviceDescriptor {
             label: Some("hydrograd"),
             required_features: features,

@@ -84,6 +84,34 @@ impl Context {
         })
     }
 
+    /// Writes calls down, in order, perhaps with the times around them.
+    pub(super) fn encode<'a>(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        calls: impl IntoIterator<Item = &'a Call>,
+        timestamp_writes: Option<wgpu::ComputePassTimestampWrites>,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: None,
+            timestamp_writes,
+        });
+        let mut made = 0;
+        for call in calls {
+            made += 1;
+            if call.count.contains(&0) {
+                continue;
+            }
+            pass.set_pipeline(&call.kernel.pipeline);
+            for (i, group) in call.groups.iter().enumerate() {
+                pass.set_bind_group(i as u32, group, &[]);
+            }
+            let [x, y, z] = call.count;
+            pass.dispatch_workgroups(x, y, z);
+        }
+        drop(pass);
+        self.pool.count(|c| c.dispatches += made);
+    }
+
     /// Starts calls, in order; returns at once.
     ///
     /// # Errors
@@ -92,20 +120,18 @@ impl Context {
         let calls: Vec<&Call> = calls.into_iter().collect();
         for calls in calls.chunks(AT_ONCE) {
             let mut encoder = self.device.create_command_encoder(&Default::default());
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            for call in calls.iter().filter(|c| !c.count.contains(&0)) {
-                pass.set_pipeline(&call.kernel.pipeline);
-                for (i, group) in call.groups.iter().enumerate() {
-                    pass.set_bind_group(i as u32, group, &[]);
-                }
-                let [x, y, z] = call.count;
-                pass.dispatch_workgroups(x, y, z);
-            }
-            drop(pass);
-            self.pool.count(|c| c.dispatches += calls.len() as u64);
+            self.encode(&mut encoder, calls.iter().copied(), None);
             self.queue.submit([encoder.finish()]);
         }
         self.check()
+    }
+}
+
+impl Call {
+    /// The same with so many workgroups.
+    pub fn of(&mut self, groups: usize) -> &Self {
+        self.count = [groups as u32, 1, 1];
+        self
     }
 }
 

@@ -62,6 +62,9 @@ shaders! {
     "apply_jvp" => "adjoint/src/kernel/flux/jvp.rs::flux_jvp",
     "apply_transpose" => "coupling/full/cpu/system.rs::apply_transpose",
     "apply_transpose_jvp" => "adjoint/src/kernel/flux/vjp.rs::flux_vjp",
+    "batch_pull" => "coupling/reduced/many.rs::pull_back_pairs",
+    "batch_solve" => "coupling/reduced/linearised.rs::new",
+    "batch_tangent" => "coupling/reduced/second.rs::second",
     "blocks" => "coupling/reduced/linearised.rs::charges",
     "cgls" => "solver/cgls.rs::cgls",
     "combine" => "solver/columns.rs::combine",
@@ -100,6 +103,7 @@ macro_rules! pieces {
 pieces! {
     "vector" "flux" "normal" "potential" "layers" "pairs" "faces" "panels" "tile" "faces_tile" "panels_tile" "motion"
     "gate" "gate_state" "points" "slopes" "displaced" "shifts" "total" "wrenches"
+    "batch" "batch_rough" "batch_refine"
 }
 
 /// What is fixed when a shader is compiled.
@@ -191,7 +195,8 @@ impl Shader {
             let names = surface.and_then(|s| s.pieces(name)).unwrap_or(&one);
             for name in names {
                 out.push('\n');
-                out.push_str(PIECES.iter().find(|(n, _)| n == name)?.1);
+                let piece = PIECES.iter().find(|(n, _)| n == name)?.1;
+                write_out(&piece.lines().collect::<Vec<_>>(), constants, &mut out);
             }
         }
         // Inner doc lines are read above; they are no comments that the language knows.

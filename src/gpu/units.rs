@@ -26,12 +26,17 @@ impl Twists {
 
     /// `[body][6][columns]`.
     pub fn upload(&self, context: &Context) -> Result<Buffer> {
+        context.upload("twists", context.fine(), &self.numbers())
+    }
+
+    /// The same as numbers.
+    pub fn numbers(&self) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.all.len());
         for i in 0..self.all.nrows() {
             let unit = if i % 6 < 3 { self.length } else { 1.0 };
             out.extend((self.scale.iter().enumerate()).map(|(k, s)| self.all[(i, k)] / (unit * s)));
         }
-        context.upload("twists", context.fine(), &out)
+        out
     }
 
     /// Combinations of the columns, and the coefficients between both's units.
@@ -82,7 +87,7 @@ impl Twists {
 }
 
 /// Size of a column of twists: of its velocities, at the scene's size, and rates.
-fn size(twists: &DMatrix<f64>, k: usize, length: f64) -> f64 {
+pub(super) fn size(twists: &DMatrix<f64>, k: usize, length: f64) -> f64 {
     let column = twists.column(k);
     let of = |(i, x): (usize, &f64)| if i % 6 < 3 { x.abs() / length } else { x.abs() };
     match column.iter().enumerate().map(of).fold(0.0, f64::max) {

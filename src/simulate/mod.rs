@@ -1,6 +1,7 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
 mod allocation;
+mod batch;
 mod checkpoint;
 mod controls;
 mod deciding;
@@ -45,6 +46,7 @@ mod trajectory;
 mod which;
 
 pub use allocation::Allocation;
+pub use batch::{BatchReport, Begin, Member, Ran};
 pub use checkpoint::Checkpoint;
 pub use controls::Controls;
 pub use equations::Equations;

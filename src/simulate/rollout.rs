@@ -242,6 +242,16 @@ impl Rollout {
     pub fn vjp_with(
         &self,
         cotangents: &Cotangents,
+        progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    ) -> Result<Gradient> {
+        rayon::scope(|_| self.vjp_here(&self.simulator, cotangents, progress))
+    }
+
+    /// The same on this thread, with a simulator that is this rollout's but for what computes its coupling.
+    pub(super) fn vjp_here(
+        &self,
+        simulator: &Simulator,
+        cotangents: &Cotangents,
         mut progress: impl FnMut(usize) -> ControlFlow<()> + Send,
     ) -> Result<Gradient> {
         let ended = |done| match progress(done) {
@@ -250,10 +260,10 @@ impl Rollout {
                 what: format!("the gradient, {done} of {} steps back", self.steps()),
             }),
         };
-        let mut sums = Sums::new(&self.simulator, self.controls.shape());
-        let bar = self.back(None, cotangents, 0, &mut sums, ended)?;
+        let mut sums = Sums::new(simulator, self.controls.shape());
+        let bar = self.back_here(simulator, None, cotangents, 0, &mut sums, ended)?;
         let first = &self.states()[0];
-        sums.start(&self.simulator, first, &self.initial_velocity, &bar)?;
+        sums.start(simulator, first, &self.initial_velocity, &bar)?;
         Ok(sums.gradient)
     }
 
@@ -270,17 +280,31 @@ impl Rollout {
         sums: &mut Sums,
         progress: impl FnMut(usize) -> Result<()> + Send,
     ) -> Result<StateBar> {
+        let simulator = &self.simulator;
+        rayon::scope(|_| self.back_here(simulator, end, cotangents, first, sums, progress))
+    }
+
+    /// The same on this thread, as [`Rollout::vjp_here`].
+    fn back_here(
+        &self,
+        simulator: &Simulator,
+        end: Option<StateBar>,
+        cotangents: &Cotangents,
+        first: usize,
+        sums: &mut Sums,
+        progress: impl FnMut(usize) -> Result<()> + Send,
+    ) -> Result<StateBar> {
         self.check(cotangents)?;
         if end.is_some() {
             // What is read from the part's last state would be lost.
             self.refuse_gains(cotangents.observables.keys())?;
         }
-        let trajectory = self.simulator.trajectory(&self.controls);
+        let trajectory = simulator.trajectory(&self.controls);
         let seeds = self.seeds(cotangents)?;
-        let (bar, partials) = rayon::scope(|_| match end {
+        let (bar, partials) = match end {
             None => step::reverse(&trajectory, &self.tape, &seeds, progress),
             Some(bar) => step::reverse_from(&trajectory, &self.tape, bar, &seeds, progress),
-        })?;
+        }?;
         let steps = self.steps();
         let mut direct = sums.gradient.controls.columns_mut(first, steps);
         direct += &cotangents.controls;

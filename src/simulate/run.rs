@@ -78,6 +78,17 @@ impl Simulator {
         controls: &Controls,
         progress: impl FnMut(usize) -> ControlFlow<()> + Send,
     ) -> std::result::Result<Rollout, Box<Halted>> {
+        // On a thread of the pool from first step to last: entering the pool costs as much as a small step's work.
+        rayon::scope(|_| self.rollout_here(state, controls, progress))
+    }
+
+    /// The same on this thread.
+    pub(super) fn rollout_here(
+        &self,
+        state: &State,
+        controls: &Controls,
+        progress: impl FnMut(usize) -> ControlFlow<()> + Send,
+    ) -> std::result::Result<Rollout, Box<Halted>> {
         let at = |error| Halted {
             step: state.step,
             time: state.step as f64 * self.time_step(),
@@ -89,8 +100,7 @@ impl Simulator {
         let matrix = controls.matrix().clone();
         let trajectory = self.trajectory(&matrix);
         let ended = ended(progress, steps);
-        let (tape, failed) =
-            rayon::scope(|_| step::forward_as_far(&trajectory, state.clone(), steps, ended));
+        let (tape, failed) = step::forward_as_far(&trajectory, state.clone(), steps, ended);
         let rollout = tape
             .observations()
             .first()

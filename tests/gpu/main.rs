@@ -1,5 +1,6 @@
 //! The GPU against the CPU. Fails where there is no adapter: a software one does.
 
+mod batch;
 #[cfg(feature = "cli")]
 mod cli;
 mod counters;
@@ -31,6 +32,9 @@ comparisons! {
     "apply_jvp" => kernels::products,
     "apply_transpose" => kernels::products,
     "apply_transpose_jvp" => kernels::products,
+    "batch_pull" => batch::rungs,
+    "batch_solve" => batch::rungs,
+    "batch_tangent" => batch::rungs,
     "blocks" => reduced::rungs,
     "cgls" => kernels::solves,
     "combine" => coupled::combinations,

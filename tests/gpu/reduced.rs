@@ -36,7 +36,7 @@ fn shapes() -> &'static [Arc<ReducedBody>; 2] {
 }
 
 /// Three bodies, two of one shape.
-fn three(walls: &[Wall], cutoff: Option<Cutoff>, excluded: &Exclusions) -> Arc<Reduced> {
+pub fn three(walls: &[Wall], cutoff: Option<Cutoff>, excluded: &Exclusions) -> Arc<Reduced> {
     let [ball, egg] = shapes().clone();
     let bodies = vec![ball.clone(), egg, ball];
     let reduced = Reduced::new(bodies, walls, |_, _| cutoff).unwrap();

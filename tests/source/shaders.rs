@@ -16,12 +16,32 @@ fn root() -> &'static Path {
 
 const SURFACES: [Surface; 2] = [Surface::Faces, Surface::Panels];
 
+/// A setting with as many columns in all as there are, and with one more.
+fn widened(given: &Vec<(&'static str, Constant)>) -> Vec<Vec<(&'static str, Constant)>> {
+    let columns = given.iter().find_map(|(name, value)| match (name, value) {
+        (&"COLUMNS", Constant::Number(n)) => Some(*n),
+        _ => None,
+    });
+    let columns = columns.expect("COLUMNS before WIDE");
+    let with = |n: u32| [&given[..], &[("WIDE", Constant::Number(n))]].concat();
+    vec![with(columns), with(columns + 1)]
+}
+
 /// Every setting of a shader's constants that differs in kind.
 fn settings(shader: &Shader) -> Vec<Vec<(&'static str, Constant)>> {
     let mut all = vec![Vec::new()];
     for name in shader.constants() {
         let values = match name {
+            "COLUMNS" if shader.name == "batch_tangent" => {
+                vec![Constant::Number(1), Constant::Number(2)]
+            }
             "COLUMNS" => vec![Constant::Number(1), Constant::Number(12)],
+            // Columns, with one more beside them or without.
+            "WIDE" => {
+                all = all.iter().flat_map(widened).collect();
+                continue;
+            }
+            "LANES" => vec![Constant::Number(64), Constant::Number(256)],
             "LEFT" if shader.name.ends_with("_hvp") => {
                 vec![Constant::Number(1), Constant::Number(2)]
             }

@@ -17,13 +17,14 @@ mod second;
 mod solution;
 mod solve;
 
+use super::batch::Batch;
 use super::context::Context;
 use super::points::{Compressed, PlacedPoints};
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
 use crate::coupling::reduced::Reduced;
 use crate::coupling::{
-    Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential,
+    Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential, Together,
 };
 use crate::{Error, Result};
 use linearised::Solved;
@@ -107,6 +108,11 @@ impl Coupling for GpuReduced {
 
     fn differentiable(&self) -> Option<&dyn Linearise> {
         Some(self)
+    }
+
+    fn together(&self, scenes: usize, columns: usize) -> Result<Option<Arc<dyn Together>>> {
+        let made = Batch::new(self.context(), self.reduced(), scenes, columns)?;
+        Ok(made.map(|batch| Arc::new(batch) as Arc<dyn Together>))
     }
 
     /// On the CPU.

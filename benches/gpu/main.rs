@@ -6,6 +6,10 @@
 //! second derivative, by fundamental solutions and by coupled panels; between them falling spheres of the fidelity `reduced`. Last, products with K alone: pairs of a face and a source a second, and what share that is of the card's
 //! single-precision peak (`--peak`, or of a card known here). What wouldn't end within the minutes given (default 9), or
 //! not fit into memory, is left out, with the reason.
+//!
+//! With `batch` alone (`-- batch [--seconds S] [--steps N] [--most SCENES]`): many equal scenes together, of the size of the grasp.
+
+mod batch;
 
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
 use hydrograd::boundary::{BodyBoundary, MfsSettings as BodySettings, PanelBoundary};
@@ -376,6 +380,9 @@ fn main() -> hydrograd::Result<()> {
         adapter.interface,
         context.fine().name()
     );
+    if std::env::args().any(|a| a == "batch") {
+        return batch::run(&context);
+    }
     let budget = Budget {
         left: &left,
         // Never infinite, however short it was.
@@ -386,6 +393,7 @@ fn main() -> hydrograd::Result<()> {
     compressed(&left)?;
     panels(&context, &budget)?;
     rows(&context, &budget)?;
+    batch::run(&context)?;
     println!("\n{:.0} s in all", start.elapsed().as_secs_f64());
     Ok(())
 }

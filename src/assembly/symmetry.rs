@@ -73,7 +73,7 @@ fn acting(system: &System, parameters: &Parameters, roots: &[usize]) -> Mat6 {
     let forces = system.forces.iter();
     let mut outside: Vec<Outside> = forces.map(|f| f.outside(&group, parameters)).collect();
     if let Some(contact) = &system.contact {
-        let pairs = contact.shapes.pairs().iter();
+        let pairs = contact.shapes.pairs();
         outside.extend(pairs.map(|p| group.across(Some(p.first), p.second_body())));
     }
     if system.limits.iter().any(|limit| group.hangs_on(limit.v)) {

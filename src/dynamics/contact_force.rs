@@ -13,7 +13,7 @@ use super::{
 use crate::Result;
 use crate::adjoint::contact::{Push, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::adjoint::lie::{Pose, Vec6, angular, point_velocity};
-use crate::contact::ContactPoint;
+use crate::contact::{ContactPair, ContactPoint};
 use crate::multibody::{Cotangents, Virtual};
 use nalgebra::{DMatrix, DVector};
 
@@ -51,34 +51,34 @@ impl System {
         parameters: &Parameters,
         poses: &[Pose],
     ) -> Result<Vec<PairContact>> {
-        let pairs = self.contact.as_ref().map_or(0, |m| m.laws.len());
         let mut out = Vec::new();
-        for k in 0..pairs {
-            out.extend(self.pair_points(parameters, poses, k, 1, 0.0)?);
+        if let Some(model) = &self.contact {
+            for pair in model.near(poses, |b| model.shapes.share_ahead(b)) {
+                out.extend(self.pair_points(parameters, poses, &pair, 1, 0.0)?);
+            }
         }
         Ok(out)
     }
 
-    /// Those of pair `k`, whose law is sharpened `sharpness` times; as far as `travel` (m) beyond where it sets in, if that is farther than
+    /// Those of a pair whose law is sharpened `sharpness` times; as far as `travel` (m) beyond where it sets in, if that is farther than
     /// one always looks.
     pub(super) fn pair_points(
         &self,
         parameters: &Parameters,
         poses: &[Pose],
-        k: usize,
+        pair: &ContactPair,
         sharpness: usize,
         travel: f64,
     ) -> Result<Vec<PairContact>> {
         let Some(model) = &self.contact else {
             return Ok(Vec::new());
         };
-        let pair = &model.shapes.pairs()[k];
-        let law = model.law(k, parameters);
+        let law = model.law(pair, parameters);
         let onset = law.gap + law.width;
-        let reach = onset + model.shapes.ahead(k).max(travel);
-        let found = model.shapes.points_within(k, poses, reach)?;
+        let reach = onset + model.shapes.ahead(pair).max(travel);
+        let found = model.shapes.points_within(pair, poses, reach)?;
         let place = |point: ContactPoint| PairContact {
-            pair: k,
+            pair: *pair,
             first: pair.first,
             second: pair.second_body(),
             law: sharpened(law, sharpness),

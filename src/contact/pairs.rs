@@ -104,6 +104,18 @@ impl Contacts {
         out
     }
 
+    /// Whether any of the bodies that `inside` names may come in contact with a wall or with one that it doesn't.
+    pub fn reach_out(&self, inside: &[bool]) -> bool {
+        let (own, others): (Vec<usize>, Vec<usize>) = (0..self.shapes.len())
+            .filter(|b| !self.shapes[*b].is_empty())
+            .partition(|b| inside[*b]);
+        let meets = |a: usize| others.iter().any(|b| self.pairing.has(a, *b));
+        match self.walls.is_empty() {
+            true => own.into_iter().any(meets),
+            false => !own.is_empty(),
+        }
+    }
+
     /// The pairs of the pieces of a body and another, or a wall.
     fn pieces_of(&self, a: usize, second: Other) -> impl Iterator<Item = ContactPair> + use<> {
         let others = match second {

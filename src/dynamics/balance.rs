@@ -16,6 +16,7 @@
 
 use super::fluid::{self, FluidMomenta};
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
+use super::island_matrix::IslandMatrix;
 use super::linearisation::Water;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Parameters, Slopes};
@@ -346,15 +347,15 @@ impl Linearisation<'_> {
         .collect()
     }
 
-    /// ∂f/∂v, column by column.
+    /// ∂f/∂v, by islands.
     ///
     /// # Errors
     /// As [`Linearisation::force`].
-    pub fn force_velocity_jacobian(
+    pub(super) fn force_velocity_jacobian(
         &self,
         v: &DVector<f64>,
         control: &DVector<f64>,
-    ) -> Result<DMatrix<f64>> {
+    ) -> Result<IslandMatrix> {
         let islands = self.islands();
         let changes = islands.changes();
         let changed = match (self.acting(), &self.fluid) {
@@ -364,7 +365,7 @@ impl Linearisation<'_> {
             _ => vec![Vec::new(); changes.len()],
         };
         let found = self.force_jvp(v, control, &changes, &changed);
-        Ok(islands.matrix(&found))
+        Ok(IslandMatrix::new(islands, &found))
     }
 
     /// Transpose of [`Linearisation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.

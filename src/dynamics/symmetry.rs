@@ -7,7 +7,7 @@ use super::Drive;
 use super::force::Outside;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::multibody::{Link, Tree};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Part of the largest singular value below which one counts as zero.
 const ZERO: f64 = 1e-10;
@@ -23,10 +23,54 @@ pub struct Group {
 /// Rigid motions that are free.
 #[derive(Clone, Debug)]
 pub struct FreeMotions {
-    /// Frame velocities, velocities × motions.
-    pub velocities: DMatrix<f64>,
+    /// Frame velocities.
+    pub velocities: Motions,
     /// The spatial twist of each.
     pub twists: Vec<Vec6>,
+}
+
+/// Frame velocities of some motions, by those that aren't zero: a motion of few bodies takes little room.
+#[derive(Clone, Debug, Default)]
+pub struct Motions {
+    velocities: usize,
+    /// Of each motion its velocities, with their numbers.
+    each: Vec<Vec<(usize, f64)>>,
+}
+
+impl Motions {
+    /// Number of motions.
+    pub fn len(&self) -> usize {
+        self.each.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.each.is_empty()
+    }
+
+    /// Of frame momenta, one a velocity, the part along each motion.
+    pub fn tr_mul(&self, momenta: &DVector<f64>) -> DVector<f64> {
+        let along = |motion: &Vec<(usize, f64)>| motion.iter().map(|(i, x)| x * momenta[*i]).sum();
+        DVector::from_iterator(self.len(), self.each.iter().map(along))
+    }
+
+    /// Frame velocities of all motions at these rates.
+    pub fn mul(&self, rates: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(self.velocities);
+        for (motion, rate) in self.each.iter().zip(rates.iter()) {
+            motion.iter().for_each(|(i, x)| out[*i] += x * rate);
+        }
+        out
+    }
+
+    /// All of them, velocities × motions.
+    pub fn dense(&self) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.velocities, self.len());
+        for (k, motion) in self.each.iter().enumerate() {
+            motion.iter().for_each(|(i, x)| out[(*i, k)] = *x);
+        }
+        out
+    }
 }
 
 /// Twists that something outside stands against, as a matrix whose null space is what it leaves free.
@@ -96,7 +140,7 @@ fn allowed(root: &Link) -> DMatrix<f64> {
 
 /// The motions that are free for each group of bodies; a group with a driven joint to the world has none.
 pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMotions {
-    let (mut columns, mut twists): (Vec<Vec<f64>>, Vec<Vec6>) = Default::default();
+    let (mut each, mut twists): (Vec<Vec<(usize, f64)>>, Vec<Vec6>) = Default::default();
     for Group { roots, refused } in groups {
         let free = |b: &usize| drives[*b] == Drive::Free && tree.is_single(*b);
         if roots.is_empty() || !roots.iter().all(free) {
@@ -104,23 +148,24 @@ pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMoti
         }
         let roots: Vec<&Link> = roots.iter().map(|b| &tree.links()[*b]).collect();
         for twist in common_twists(&roots, refused) {
-            let mut column = vec![0.0; tree.velocities()];
+            let mut motion = Vec::new();
             for root in &roots {
                 // Frame velocities of the twist: least squares, which is exact here.
                 let basis = allowed(root);
                 let right = DMatrix::from_column_slice(6, 1, twist.as_slice());
                 if let Ok(hat) = basis.svd(true, true).solve(&right, ZERO) {
-                    for (i, x) in root.v.clone().zip(hat.iter()) {
-                        column[i] = *x;
-                    }
+                    motion.extend(root.v.clone().zip(hat.iter().copied()));
                 }
             }
-            columns.push(column);
+            each.push(motion);
             twists.push(twist);
         }
     }
     FreeMotions {
-        velocities: DMatrix::from_fn(tree.velocities(), columns.len(), |i, j| columns[j][i]),
+        velocities: Motions {
+            velocities: tree.velocities(),
+            each,
+        },
         twists,
     }
 }

@@ -1,10 +1,11 @@
 //! Many bodies that fall through water onto a heap, between walls.
 
 use super::GRAVITY;
-use hydrograd::adjoint::lie::{Vec3, exp_matrix};
+use hydrograd::Rollout;
+use hydrograd::adjoint::lie::Vec3;
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::scene::{Body, Drag, Fluid, Scene, Shape};
-use hydrograd::{Rollout, simulate::Sample};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
+use hydrograd::simulate::Sample;
 
 /// Room of a body before it falls, m.
 const CELL: f64 = 0.09;
@@ -33,15 +34,12 @@ pub fn heap(bodies: usize, time_step: f64) -> Scene {
             0.06 + CELL * layer as f64,
         );
         let at = at + 0.1 * CELL * Vec3::from(random.vector(1.0));
-        let turn = exp_matrix(&(3.0 * Vec3::from(random.vector(1.0))));
-        let turn = nalgebra::UnitQuaternion::from_matrix(&turn);
         let mut body = Body::new(shape(b, [0.8, 1.0, 1.2][b / 6 % 3]))
             .density([1400.0, 2000.0, 2700.0][b % 3])
-            .at(at.into());
-        body.start = vec![at.x, at.y, at.z];
-        body.start.extend(turn.scaled_axis().iter());
-        body.placement = Default::default();
+            .at(at.into())
+            .rotated(random.vector(3.0));
         body.drag = Some(Drag {
+            quadratic_part: DragPart::Normal,
             quadratic: 1.0,
             ..Drag::default()
         });

@@ -1,7 +1,7 @@
 //! Many bodies that settle into a heap, and the sparse matrices of such scenes against whole ones.
 
 use crate::support::CONTACT_INTEGRATORS;
-use crate::support::heap::{HALF, Heap, heap};
+use crate::support::heap::{Heap, heap};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Scene, Spring};
@@ -56,7 +56,7 @@ fn sixty_bodies_settle() {
     assert!(found.finite && found.inside == 60, "{}", found.inside);
     assert!(found.deepest > -1e-3, "{}", found.deepest);
     assert!(found.kinetic < 0.2 * found.most_kinetic);
-    assert!(found.height < 3.0 * HALF);
+    assert!(found.height < 0.3, "{}", found.height);
 }
 
 /// Sparse matrices end at the states of whole ones, to rounding.
@@ -73,7 +73,7 @@ fn sparse_is_as_whole() {
             rollout
         });
         // One step to rounding; more make of that what contact makes of differences.
-        for (n, limit) in [(1, 1e-12), (20, 1e-8)] {
+        for (n, limit) in [(1, 1e-12), (20, 1e-10)] {
             let [a, b] = [&sparse, &whole].map(|r| r.samples()[n].v.clone());
             let apart = (&a - &b).norm() / b.norm();
             println!("{integrator:?}: after {n} steps {apart:.1e} apart");

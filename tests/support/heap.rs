@@ -1,30 +1,32 @@
-//! Many bodies that fall through water onto a heap, between walls.
+//! Many bodies that fall through water onto a wide floor, as a heap.
 
 use super::GRAVITY;
 use hydrograd::Rollout;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
+use hydrograd::scene::{Body, Contact, Drag, DragPart, Fluid, Scene, Shape};
 use hydrograd::simulate::Sample;
 
 /// Room of a body before it falls, m.
 const CELL: f64 = 0.09;
 /// Bodies beside one another.
 const SIDE: usize = 5;
-/// Half the way between opposite walls, m.
-pub const HALF: f64 = 0.5 * CELL * SIDE as f64 + 0.02;
+/// How far from the middle a body may come to rest, m.
+pub const REACH: f64 = 1.0;
 
-/// So many bodies of six kinds and a few sizes, heavier than the water, in a grid that is a little out of order, in a shaft of four walls above a floor at z = 0.
+/// So many bodies of six kinds and a few sizes, heavier than the water, in a grid that is a little out of order, a
+/// column above a floor at z = 0.
 pub fn heap(bodies: usize, time_step: f64) -> Scene {
     let mut random = Samples::new(17);
     let mut scene = Scene::new(Fluid::fresh_water());
     scene.gravity = [0.0, 0.0, -GRAVITY];
     scene.time_step = time_step;
-    scene.contact = Some(Default::default());
+    scene.contact = Some(Contact {
+        rolling_friction: 5e-4,
+        torsional_friction: 5e-4,
+        ..Contact::default()
+    });
     scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
-    for [x, y] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-        scene.add_wall([-HALF * x, -HALF * y, 0.0], [x, y, 0.0]);
-    }
     for b in 0..bodies {
         let (layer, cell) = (b / (SIDE * SIDE), b % (SIDE * SIDE));
         let across = |k: usize| CELL * (k as f64 - 0.5 * (SIDE - 1) as f64);
@@ -68,7 +70,7 @@ fn shape(kind: usize, size: f64) -> Shape {
 
 /// What became of a heap.
 pub struct Heap {
-    /// Bodies whose middles are inside the shaft, above the floor.
+    /// Bodies whose middles are above the floor, and no farther from that of all than [`REACH`].
     pub inside: usize,
     /// Whether all numbers are.
     pub finite: bool,
@@ -106,7 +108,7 @@ impl Heap {
             deepest = least(sample)?.min(deepest);
         }
         let last = samples.last().expect("a start");
-        let inside = |x: &Vec3| x.z > 0.0 && x.x.abs() < HALF && x.y.abs() < HALF;
+        let inside = |x: &Vec3| x.z > 0.0 && x.xy().norm() < REACH;
         let heights = last.poses.iter().map(|g| g.translation.z);
         let finite = |s: &Sample| s.q.iter().chain(&s.v).all(|x| x.is_finite());
         let kinetic = samples.iter().map(|s| s.kinetic_energy);

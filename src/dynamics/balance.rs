@@ -347,11 +347,20 @@ impl Linearisation<'_> {
         .collect()
     }
 
-    /// ∂f/∂v, by islands.
+    /// ∂f/∂v.
     ///
     /// # Errors
     /// As [`Linearisation::force`].
-    pub(super) fn force_velocity_jacobian(
+    pub fn force_velocity_jacobian(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+    ) -> Result<DMatrix<f64>> {
+        Ok(self.force_velocity_blocks(v, control)?.dense())
+    }
+
+    /// The same by islands.
+    pub(super) fn force_velocity_blocks(
         &self,
         v: &DVector<f64>,
         control: &DVector<f64>,

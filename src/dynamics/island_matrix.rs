@@ -147,6 +147,9 @@ impl IslandMatrix {
 
     /// All of it, zeros included.
     pub fn dense(&self) -> DMatrix<f64> {
+        if self.is_whole() {
+            return self.columns.clone();
+        }
         let mut out = DMatrix::zeros(self.columns.nrows(), self.columns.nrows());
         for island in self.islands.each() {
             for i in island {

@@ -229,7 +229,7 @@ impl<'s, 'a> Equation<'s, 'a> {
     /// The same at the first trial of a step, if the step isn't too long.
     pub fn first_factor(&self, now: &Trial) -> std::result::Result<IslandFactor, Halt> {
         let (e, start) = (self.e, &self.start);
-        let rates = e.force_velocity_jacobian(&now.v, &start.input.control)?;
+        let rates = e.force_velocity_blocks(&now.v, &start.input.control)?;
         if start.plan.may_cut()
             && let Some(times) = excess(e, start.split, &now.v, &rates, self.rule)
         {
@@ -272,7 +272,7 @@ pub(super) fn solve_stage<'a>(
             }
             factor
         } else {
-            equation.factor(&now, &e.force_velocity_jacobian(&now.v, control)?)
+            equation.factor(&now, &e.force_velocity_blocks(&now.v, control)?)
         };
         let Some(step) = factor.solve(&split.take(&now.defect)) else {
             break;
@@ -438,7 +438,7 @@ impl AdjointStage {
         reached: &DVector<f64>,
         rule: Rule,
     ) -> Result<Self> {
-        let rates = e.force_velocity_jacobian(v, &start.input.control)?;
+        let rates = e.force_velocity_blocks(v, &start.input.control)?;
         let matrix = stage_matrix(e, v, &rates, reached, rule);
         let factor = matrix.factored(&start.split.free, true);
         Ok(Self {

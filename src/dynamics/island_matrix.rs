@@ -1,6 +1,5 @@
 //! Matrices that tie no velocity of one island to one of another: they take as much room as there are velocities, times those of the largest island.
 
-use super::Evaluation;
 use super::islands::Islands;
 use crate::adjoint::solve::General;
 use nalgebra::{DMatrix, DVector};
@@ -203,20 +202,5 @@ impl IslandFactor {
             }
         }
         Some(out)
-    }
-}
-
-impl Evaluation<'_> {
-    /// M(q) by islands: made when it is first asked for.
-    pub(super) fn mass_blocks(&self) -> &IslandMatrix {
-        self.mass_blocks.get_or_init(|| {
-            let islands = self.islands();
-            if islands.velocities() < MANY || islands.is_whole() {
-                return IslandMatrix::whole(self.mass_matrix().clone());
-            }
-            let changes = islands.changes();
-            let products: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
-            IslandMatrix::new(islands, &products).symmetric()
-        })
     }
 }

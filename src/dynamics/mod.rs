@@ -26,6 +26,7 @@ mod islands;
 mod limit;
 mod linearisation;
 mod momentum;
+mod motions;
 mod parameters;
 mod shape;
 mod shapes;
@@ -33,6 +34,7 @@ mod slopes;
 mod stiffness;
 mod symmetry;
 mod system;
+mod ties;
 
 pub use armature::Armature;
 pub use body::{BodyData, SiteData};
@@ -50,12 +52,13 @@ pub use integrator::{
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
+pub use motions::Motions;
 pub use parameters::{
     BodyValues, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };
 pub use shapes::{Follows, Shapes};
 pub use slopes::{InputTangents, Slopes};
 pub use stiffness::Damping;
-pub use symmetry::{FreeMotions, Motions};
+pub use symmetry::FreeMotions;
 pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

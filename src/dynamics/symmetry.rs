@@ -3,11 +3,11 @@
 //! Where all joints to the world that a group of bodies hangs on allow one and the same rigid motion, and no wall of the water stands in its way, it changes
 //! no kinetic energy, and the momentum along it stays where nothing outside acts.
 
-use super::Drive;
 use super::force::Outside;
+use super::{Drive, Motions};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::multibody::{Link, Tree};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Part of the largest singular value below which one counts as zero.
 const ZERO: f64 = 1e-10;
@@ -27,50 +27,6 @@ pub struct FreeMotions {
     pub velocities: Motions,
     /// The spatial twist of each.
     pub twists: Vec<Vec6>,
-}
-
-/// Frame velocities of some motions, by those that aren't zero: a motion of few bodies takes little room.
-#[derive(Clone, Debug, Default)]
-pub struct Motions {
-    velocities: usize,
-    /// Of each motion its velocities, with their numbers.
-    each: Vec<Vec<(usize, f64)>>,
-}
-
-impl Motions {
-    /// Number of motions.
-    pub fn len(&self) -> usize {
-        self.each.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.each.is_empty()
-    }
-
-    /// Of frame momenta, one a velocity, the part along each motion.
-    pub fn tr_mul(&self, momenta: &DVector<f64>) -> DVector<f64> {
-        let along = |motion: &Vec<(usize, f64)>| motion.iter().map(|(i, x)| x * momenta[*i]).sum();
-        DVector::from_iterator(self.len(), self.each.iter().map(along))
-    }
-
-    /// Frame velocities of all motions at these rates.
-    pub fn mul(&self, rates: &DVector<f64>) -> DVector<f64> {
-        let mut out = DVector::zeros(self.velocities);
-        for (motion, rate) in self.each.iter().zip(rates.iter()) {
-            motion.iter().for_each(|(i, x)| out[*i] += x * rate);
-        }
-        out
-    }
-
-    /// All of them, velocities × motions.
-    pub fn dense(&self) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(self.velocities, self.len());
-        for (k, motion) in self.each.iter().enumerate() {
-            motion.iter().for_each(|(i, x)| out[(*i, k)] = *x);
-        }
-        out
-    }
 }
 
 /// Twists that something outside stands against, as a matrix whose null space is what it leaves free.
@@ -162,10 +118,7 @@ pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMoti
         }
     }
     FreeMotions {
-        velocities: Motions {
-            velocities: tree.velocities(),
-            each,
-        },
+        velocities: Motions::new(tree.velocities(), each),
         twists,
     }
 }

@@ -3,7 +3,8 @@
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::dynamics::force::{Outside, Together};
 use crate::dynamics::{
-    FreeMotions, Group, Motions, Parameters, System, free_motions, refuse, refuse_tilt,
+    ContactModel, FreeMotions, Group, Motions, Parameters, System, free_motions, refuse,
+    refuse_tilt,
 };
 use crate::scene::Scene;
 
@@ -85,10 +86,9 @@ fn acting(system: &System, parameters: &Parameters, roots: &[usize]) -> Mat6 {
     };
     let forces = system.forces.iter();
     let mut outside: Vec<Outside> = forces.map(|f| f.outside(&group, parameters)).collect();
-    if let Some(contact) = &system.contact {
-        if contact.shapes.reach_out(&bodies) {
-            outside.push(Outside::All);
-        }
+    let touched = |contact: &ContactModel| contact.shapes.reach_out(&bodies);
+    if system.contact.as_ref().is_some_and(touched) {
+        outside.push(Outside::All);
     }
     if system.limits.iter().any(|limit| group.hangs_on(limit.v)) {
         outside.push(Outside::All);

@@ -84,7 +84,7 @@ impl Contacts {
         let near = Neighbours::new((0..self.shapes.len()).map(region).collect());
         let mut bodies = near.pairs().peekable();
         let mut out = Vec::new();
-        for a in 0..self.shapes.len() {
+        for (a, (own, pose)) in self.shapes.iter().zip(poses).enumerate() {
             while let Some((_, b)) = bodies.next_if(|(first, _)| *first == a) {
                 if self.pairing.has(a, b) {
                     out.extend(self.pieces_of(a, Other::Body(b)));
@@ -92,11 +92,11 @@ impl Contacts {
             }
             for (w, wall) in self.walls.iter().enumerate() {
                 let far = |shape: &ContactShape| {
-                    let ball = shape.ball_at(&poses[a]);
+                    let ball = shape.ball_at(pose);
                     wall.height(&ball.center) - ball.radius >= 2.0 * reach(a)
                 };
                 // What isn't a number isn't far.
-                if !self.shapes[a].iter().all(far) {
+                if !own.iter().all(far) {
                     out.extend(self.pieces_of(a, Other::Wall(w)));
                 }
             }

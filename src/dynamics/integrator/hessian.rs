@@ -18,7 +18,10 @@ pub(super) enum Hessian {
 
 /// Where the last Hessian had entries, and what its factor fills: as a solve goes on, the same places press.
 #[derive(Default)]
-pub(super) struct Places(Option<(Vec<(usize, usize)>, Arc<SparsePattern>)>);
+pub(super) struct Places {
+    entries: Vec<(usize, usize)>,
+    pattern: Option<Arc<SparsePattern>>,
+}
 
 impl Hessian {
     /// At the velocity `v` and the time step `dt` (s).
@@ -111,13 +114,12 @@ fn sparse(
             add(i, j, dt * x);
         }
     });
-    if places.0.as_ref().is_none_or(|(last, _)| *last != entries) {
+    if places.pattern.is_none() || places.entries != entries {
         let order = order(split.free.len(), &groups, &entries)?;
-        let pattern = Arc::new(SparsePattern::new(&order, &entries)?);
-        places.0 = Some((entries, pattern));
+        places.pattern = Some(Arc::new(SparsePattern::new(&order, &entries)?));
+        places.entries = entries;
     }
-    let (_, pattern) = places.0.as_ref()?;
-    pattern.factor(&values)
+    places.pattern.as_ref()?.factor(&values)
 }
 
 /// The order of elimination of so many rows, by groups of them.

@@ -67,7 +67,7 @@ fn main() -> hydrograd::Result<()> {
             false,
             Integrator::MomentumEuler,
             "free, momentum Euler",
-            200,
+            800,
         ),
     ];
     println!(

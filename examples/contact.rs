@@ -46,7 +46,8 @@ fn gaps() -> Result<()> {
         .system()
         .contact
         .as_ref()
-        .map_or(0.0, |c| c.laws[0].gap);
+        .and_then(|c| c.gaps().next())
+        .map_or(0.0, |g| g.gap);
     for factor in [0.25, 0.5, 1.0, 2.0] {
         let mut scene = scene.clone();
         scene.contact.get_or_insert_default().gap = Some(factor * default);
@@ -156,7 +157,9 @@ fn sliding() -> Result<()> {
             scene.initial.v = vec![2.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             simulator(&scene, Fidelity::Isolated)
         };
-        let gap = (block(0.01)?.system().contact.as_ref()).map_or(0.0, |c| c.laws[0].gap);
+        let gap = (block(0.01)?.system().contact.as_ref())
+            .and_then(|c| c.gaps().next())
+            .map_or(0.0, |g| g.gap);
         // From where it will ride: nearer, it would be thrown up.
         let simulator = block(gap + 0.5 * 2.0 * dt)?;
         let n = (0.05 / dt).round() as usize;

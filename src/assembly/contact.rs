@@ -3,9 +3,8 @@
 use super::Choices;
 use crate::adjoint::contact::Law;
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::contact::{ContactPair, ContactShape, Contacts};
-use crate::dynamics::{ContactGap, ContactModel, Integrator, Parameters};
-use crate::geometry::Other;
+use crate::contact::{ContactShape, Contacts};
+use crate::dynamics::{ContactGap, ContactLaws, ContactModel, Integrator, Parameters};
 use crate::scene::{Body, Contact, Scene, Shape};
 use crate::water::{Prepared, Surface, pose};
 use crate::{Error, Result};
@@ -85,11 +84,9 @@ pub(super) fn assemble(
         });
     }
     let carriers = scene.carriers();
-    let pairs: Vec<ContactPair> = (water.clearance.moving.pairs().iter())
-        .filter(|(a, other)| !matches!(other, Other::Body(b) if carriers.are_neighbours(*a, *b)))
-        .map(|&(first, second)| ContactPair { first, second })
-        .collect();
-    let shapes = Contacts::new(shapes, &scene.walls, &pairs)?;
+    let linked = (0..scene.bodies.len()).filter_map(|b| Some((carriers.submerged_parent(b)?, b)));
+    let pairing = water.clearance.moving.pairing().clone().but(linked);
+    let shapes = Contacts::new(shapes, &scene.walls, pairing)?;
     let moving = |b: &usize| !carriers.is_static(*b);
     let bodies = || (0..scene.bodies.len()).filter(moving);
     let size = bodies()
@@ -106,26 +103,25 @@ pub(super) fn assemble(
         ));
     }
     let width = given.width.unwrap_or(WIDTH * size);
-    let gap = |pair: &ContactPair| (ROOM * resolved(water, surfaces, pair)).max(SKIN * size);
-    let spin = |pair: &ContactPair| {
-        let both = [Some(pair.first), pair.second_body()];
-        let radii = both.into_iter().flatten().filter_map(|b| shapes.radius(b));
-        let least = radii.fold(f64::INFINITY, f64::min);
-        given.stiction_speed / least
+    let each = (0..scene.bodies.len()).map(|b| ROOM * resolved(water, surfaces, b));
+    let laws = ContactLaws {
+        common: Law {
+            stiffness,
+            dissipation: given.dissipation,
+            friction: given.friction,
+            torsional_friction: given.torsional_friction,
+            rolling_friction: given.rolling_friction,
+            stiction_speed: given.stiction_speed,
+            stiction_spin: f64::INFINITY,
+            gap: 0.0,
+            width,
+            horizon: dt,
+        },
+        gap: given.gap,
+        least: SKIN * size,
+        each: each.collect(),
+        radii: (0..scene.bodies.len()).map(|b| shapes.radius(b)).collect(),
     };
-    let law = |pair: &ContactPair| Law {
-        stiffness,
-        dissipation: given.dissipation,
-        friction: given.friction,
-        torsional_friction: given.torsional_friction,
-        rolling_friction: given.rolling_friction,
-        stiction_speed: given.stiction_speed,
-        stiction_spin: spin(pair),
-        gap: given.gap.unwrap_or_else(|| gap(pair)),
-        width,
-        horizon: dt,
-    };
-    let laws = shapes.pairs().iter().map(law).collect();
     parameters.add_contact([
         stiffness,
         given.dissipation,
@@ -173,14 +169,13 @@ fn narrow(
         let of = both.filter_map(|b| Some(surfaces[b].as_ref()?.mean_edge()));
         edges * of.fold(0.0, f64::max)
     };
-    let gaps = model.gaps();
-    let all = gaps.iter().map(|gap| (gap, least(gap)));
+    let all = model.gaps().map(|gap| (gap, least(&gap)));
     let under = all.filter(|(gap, least)| gap.gap < *least);
     let (gap, least) = under.max_by(|a, b| (a.1 / a.0.gap).total_cmp(&(b.1 / b.0.gap)))?;
     Some(format!(
         "{} touch at a gap of {:.3e} m, less than the {least:.3e} m ({edges} of the faces' edges) down to which forces of the water are resolved: \
          once they do, forces across it may be off by 10 % and more (estimated; `check_gap` measures by how much); use more faces, or give a larger contact.gap",
-        between(scene, gap),
+        between(scene, &gap),
         gap.gap
     ))
 }
@@ -193,10 +188,9 @@ fn between(scene: &Scene, gap: &ContactGap) -> String {
 
 /// The largest gap, as a part of a body, if that is no small part.
 fn wide(scene: &Scene, given: &Contact, model: &ContactModel) -> Option<String> {
-    let gaps = model.gaps();
-    let wide = gaps.iter().filter(|g| g.part > WIDE);
-    let worst = wide.clone().max_by(|a, b| a.part.total_cmp(&b.part))?;
-    let more = match wide.count() - 1 {
+    let wide = || model.gaps().filter(|g| g.part > WIDE);
+    let worst = wide().max_by(|a, b| a.part.total_cmp(&b.part))?;
+    let more = match wide().count() - 1 {
         0 => String::new(),
         n => format!("; {n} more pairs are over {:.0} %", 100.0 * WIDE),
     };
@@ -209,7 +203,7 @@ fn wide(scene: &Scene, given: &Contact, model: &ContactModel) -> Option<String> 
     };
     Some(format!(
         "{} touch at a gap of {:.3e} m, {:.0} % of the smaller one's size, {why}{more}",
-        between(scene, worst),
+        between(scene, &worst),
         worst.gap,
         100.0 * worst.part
     ))
@@ -270,18 +264,11 @@ fn solves_thin(water: &Prepared) -> bool {
     kind.coupled() && (water.clearance.films || !(kind.compresses() || water.clearance.by_sources))
 }
 
-/// The gap between a pair below which the flow has no sense, m.
-fn resolved(water: &Prepared, surfaces: &[Option<Surface>], pair: &ContactPair) -> f64 {
+/// The gap between a body and others below which the flow has no sense, m.
+fn resolved(water: &Prepared, surfaces: &[Option<Surface>], b: usize) -> f64 {
     if solves_thin(water) {
         return 0.0;
     }
-    let of = |b: usize| {
-        let edge = surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
-        (water.fidelity.kind()).resolved_gap(water.gap_model.resolved[b].everywhere, edge)
-    };
-    match pair.second {
-        Other::Body(b) => of(pair.first).max(of(b)),
-        // The image is twice as far away.
-        Other::Wall(_) => 0.5 * of(pair.first),
-    }
+    let edge = surfaces[b].as_ref().map_or(0.0, Surface::mean_edge);
+    (water.fidelity.kind()).resolved_gap(water.gap_model.resolved[b].everywhere, edge)
 }

@@ -83,7 +83,7 @@ pub(super) fn lubricated(
     let mut sides = Sides::new(scene, surfaces)?;
     let carriers = scene.carriers();
     for (force, lubrication) in scene.lubrications() {
-        for &(a, other) in clearance.moving.pairs() {
+        for (a, other) in clearance.moving.pairs() {
             if let Other::Body(b) = other
                 && carriers.are_neighbours(a, b)
             {

@@ -14,8 +14,8 @@ use crate::adjoint::waterline::Hull;
 use crate::coupling::Isolated;
 use crate::dynamics::force::Streams;
 use crate::dynamics::{
-    Armature, BodyData, Declarations, Drift, Drive, FreeMotions, Parameters, SiteData, Stepper,
-    System, force,
+    Armature, BodyData, Declarations, Drift, Drive, FreeMotions, Motions, Parameters, SiteData,
+    Stepper, System, force,
 };
 use crate::memory;
 use crate::multibody::Tree;
@@ -24,7 +24,7 @@ use crate::scene::{Body, Scene, Site};
 use crate::water::{self, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
 use crate::{Error, Result};
 use bodies::{body_values, elements, hull};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
@@ -115,11 +115,13 @@ pub(crate) fn assemble(
         true => tree.following(&scene.bodies.iter().map(leader).collect::<Vec<_>>()),
         false => tree,
     };
-    let (bodies, velocities) = (scene.bodies.len() as f64, tree.velocities() as f64);
-    // The mass matrix with its factor and that of the water, and what each velocity moves.
     memory::fits(
-        &format!("a scene of {bodies} bodies with {velocities} velocities"),
-        memory::numbers(4.0 * velocities * velocities + 6.0 * bodies * velocities),
+        &format!(
+            "a scene of {} bodies with {} velocities",
+            scene.bodies.len(),
+            tree.velocities()
+        ),
+        memory::numbers(numbers(&tree, coupled(scene, choices))),
         "use fewer bodies, or several scenes where they don't feel each other",
     )?;
     let surfaces = water::surfaces(scene, &choices.water)?;
@@ -217,7 +219,7 @@ pub(crate) fn assemble(
         shapes,
         contact: None,
         limits: Vec::new(),
-        symmetric: DMatrix::zeros(0, 0),
+        symmetric: Motions::default(),
         tree,
     };
     let mut q = match scene.initial.q.is_empty() {
@@ -266,6 +268,25 @@ pub(crate) fn assemble(
         surfaces: Default::default(),
         flow_surfaces: Default::default(),
     })
+}
+
+/// Numbers that a step takes at once. Where bodies feel each other through the water, of all velocities with all: the mass matrix with its factor and that of the
+/// water, and what each velocity moves. Else of the velocities of each tree of joints with one another.
+fn numbers(tree: &Tree, coupled: bool) -> f64 {
+    let (bodies, velocities) = (tree.links().len() as f64, tree.velocities() as f64);
+    if coupled {
+        return 4.0 * velocities * velocities + 6.0 * bodies * velocities;
+    }
+    let mut roots: Vec<usize> = Vec::with_capacity(tree.links().len());
+    let mut sizes = vec![0_usize; tree.links().len()];
+    for (b, link) in tree.links().iter().enumerate() {
+        let root = link.parent.map_or(b, |parent| roots[parent]);
+        sizes[root] += link.v.len();
+        roots.push(root);
+    }
+    let largest = sizes.into_iter().max().unwrap_or(0) as f64;
+    // Inertia, its change, what the step is solved with, and the factors of that.
+    8.0 * velocities * largest
 }
 
 fn stepper<'a>(choices: &Choices, system: &'a System, parameters: &'a Parameters) -> Stepper<'a> {

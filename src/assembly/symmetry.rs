@@ -2,12 +2,14 @@
 
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::dynamics::force::{Outside, Together};
-use crate::dynamics::{FreeMotions, Group, Parameters, System, free_motions, refuse, refuse_tilt};
+use crate::dynamics::{
+    ContactModel, FreeMotions, Group, Motions, Parameters, System, free_motions, refuse,
+    refuse_tilt,
+};
 use crate::scene::Scene;
-use nalgebra::DMatrix;
 
 /// Frame velocities of motions that neither joints nor walls of the water stand against.
-pub(super) fn free(scene: &Scene, coupled: bool, system: &System) -> DMatrix<f64> {
+pub(super) fn free(scene: &Scene, coupled: bool, system: &System) -> Motions {
     let groups = groups(scene, coupled, system);
     free_motions(&system.tree, &system.drives, &groups).velocities
 }
@@ -41,13 +43,11 @@ pub(super) fn kept(
 /// Bodies in the same water, and each tree of joints outside of it.
 fn groups(scene: &Scene, coupled: bool, system: &System) -> Vec<Group> {
     let links = system.tree.links();
-    let in_water = |root: usize| {
-        system
-            .submerged()
-            .any(|(b, _)| system.tree.carries(root, b))
-    };
+    let mut wet = vec![false; links.len()];
+    let root = roots(system);
+    system.submerged().for_each(|(b, _)| wet[root[b]] = true);
     let roots = (0..links.len()).filter(|b| links[*b].parent.is_none());
-    let (wet, apart): (Vec<usize>, Vec<usize>) = roots.partition(|b| coupled && in_water(*b));
+    let (wet, apart): (Vec<usize>, Vec<usize>) = roots.partition(|b| coupled && wet[*b]);
     let walls = scene.walls.iter().map(|w| Vec3::from(w.normal));
     let wet = Group {
         roots: wet,
@@ -60,11 +60,25 @@ fn groups(scene: &Scene, coupled: bool, system: &System) -> Vec<Group> {
     std::iter::once(wet).chain(apart).collect()
 }
 
+/// Of each body the first one of its tree of joints.
+fn roots(system: &System) -> Vec<usize> {
+    let links = system.tree.links();
+    let mut out: Vec<usize> = Vec::with_capacity(links.len());
+    for (b, link) in links.iter().enumerate() {
+        out.push(link.parent.map_or(b, |parent| out[parent]));
+    }
+    out
+}
+
 /// What acts on the bodies of these trees from outside.
 fn acting(system: &System, parameters: &Parameters, roots: &[usize]) -> Mat6 {
     let links = system.tree.links();
-    let carried = |b: usize| roots.iter().any(|root| system.tree.carries(*root, b));
-    let bodies: Vec<bool> = (0..links.len()).map(carried).collect();
+    let mut chosen = vec![false; links.len()];
+    roots.iter().for_each(|root| chosen[*root] = true);
+    let bodies: Vec<bool> = self::roots(system)
+        .iter()
+        .map(|root| chosen[*root])
+        .collect();
     let roots: Vec<_> = roots.iter().map(|b| links[*b].v.clone()).collect();
     let group = Together {
         bodies: &bodies,
@@ -72,9 +86,9 @@ fn acting(system: &System, parameters: &Parameters, roots: &[usize]) -> Mat6 {
     };
     let forces = system.forces.iter();
     let mut outside: Vec<Outside> = forces.map(|f| f.outside(&group, parameters)).collect();
-    if let Some(contact) = &system.contact {
-        let pairs = contact.shapes.pairs().iter();
-        outside.extend(pairs.map(|p| group.across(Some(p.first), p.second_body())));
+    let touched = |contact: &ContactModel| contact.shapes.reach_out(&bodies);
+    if system.contact.as_ref().is_some_and(touched) {
+        outside.push(Outside::All);
     }
     if system.limits.iter().any(|limit| group.hangs_on(limit.v)) {
         outside.push(Outside::All);

@@ -5,16 +5,18 @@ use super::shape::ContactShape;
 use super::{core_core, cylinder, cylinder_pair, plane, round_core, round_pair};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity};
 use crate::geometry::convex::Form;
-use crate::geometry::{HalfSpace, Other, Wall};
+use crate::geometry::{HalfSpace, Neighbours, Other, Pairing, Region, Wall};
 use crate::{Error, Result};
 
 /// Two surfaces that may come in contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ContactPair {
     /// The body that normals point to.
     pub first: usize,
     /// What it may come in contact with.
     pub second: Other,
+    /// Number of the first body's piece, and of the second's; zero of a wall and of bodies that are one piece.
+    pub pieces: [usize; 2],
 }
 
 impl ContactPair {
@@ -33,35 +35,21 @@ pub struct Contacts {
     /// Of each body its convex pieces; of a convex one itself.
     shapes: Vec<Vec<ContactShape>>,
     walls: Vec<HalfSpace>,
-    pairs: Vec<ContactPair>,
-    /// Of each pair the number of the first body's piece, and of the second's.
-    parts: Vec<[usize; 2]>,
+    pairing: Pairing,
 }
 
 /// Points are kept up to this part of the smaller body's radius beyond the distance asked for: what may close in a step.
 const AHEAD: f64 = 0.5;
 
 impl Contacts {
-    /// From the convex pieces of each body (one of a convex body, none of a body without surface), the walls, and which bodies may
-    /// come in contact with what; each piece then may with each.
+    /// From the convex pieces of each body (one of a convex body, none of a body without surface), the walls, each of which any body may
+    /// come in contact with, and which bodies may with one another; each piece then may with each.
     ///
     /// # Errors
     /// A wall without a normal.
-    pub fn new(
-        shapes: Vec<Vec<ContactShape>>,
-        walls: &[Wall],
-        pairs: &[ContactPair],
-    ) -> Result<Self> {
-        let mut all = Vec::new();
-        for pair in pairs {
-            let others = pair.second_body().map_or(1, |b| shapes[b].len());
-            let firsts = 0..shapes[pair.first].len();
-            all.extend(firsts.flat_map(|i| (0..others).map(move |j| (*pair, [i, j]))));
-        }
-        let (pairs, parts) = all.into_iter().unzip();
+    pub fn new(shapes: Vec<Vec<ContactShape>>, walls: &[Wall], pairing: Pairing) -> Result<Self> {
         Ok(Self {
-            pairs,
-            parts,
+            pairing,
             walls: Wall::half_spaces(walls)?,
             shapes,
         })
@@ -74,9 +62,73 @@ impl Contacts {
         out
     }
 
-    /// The pairs that may come in contact: of bodies in pieces each piece by itself, and so the same bodies several times.
-    pub fn pairs(&self) -> &[ContactPair] {
-        &self.pairs
+    /// The pairs that may come in contact, ascending: of bodies in pieces each piece by itself, and so the same bodies several times.
+    pub fn pairs(&self) -> impl Iterator<Item = ContactPair> {
+        let bodies = self.shapes.len();
+        (0..bodies).flat_map(move |a| {
+            let later = a + 1..bodies;
+            let others = later.filter(move |b| self.pairing.has(a, *b));
+            let walls = (0..self.walls.len()).map(Other::Wall);
+            let others = others.map(Other::Body).chain(walls);
+            others.flat_map(move |second| self.pieces_of(a, second))
+        })
+    }
+
+    /// Those that may be nearer than the sum of `reach` (m) of both bodies, twice that of a body and a wall, the bodies being at `poses`;
+    /// and, in the same order, some that aren't.
+    pub fn near(&self, poses: &[Pose], reach: impl Fn(usize) -> f64) -> Vec<ContactPair> {
+        let region = |b: usize| {
+            let around = |shape: &ContactShape| Region::around(&shape.ball_at(&poses[b]), reach(b));
+            self.shapes[b].iter().map(around).reduce(Region::joined)
+        };
+        let near = Neighbours::new((0..self.shapes.len()).map(region).collect());
+        let mut bodies = near.pairs().peekable();
+        let mut out = Vec::new();
+        for (a, (own, pose)) in self.shapes.iter().zip(poses).enumerate() {
+            while let Some((_, b)) = bodies.next_if(|(first, _)| *first == a) {
+                if self.pairing.has(a, b) {
+                    out.extend(self.pieces_of(a, Other::Body(b)));
+                }
+            }
+            for (w, wall) in self.walls.iter().enumerate() {
+                let far = |shape: &ContactShape| {
+                    let ball = shape.ball_at(pose);
+                    wall.height(&ball.center) - ball.radius >= 2.0 * reach(a)
+                };
+                // What isn't a number isn't far.
+                if !own.iter().all(far) {
+                    out.extend(self.pieces_of(a, Other::Wall(w)));
+                }
+            }
+        }
+        out
+    }
+
+    /// Whether any of the bodies that `inside` names may come in contact with a wall or with one that it doesn't.
+    pub fn reach_out(&self, inside: &[bool]) -> bool {
+        let (own, others): (Vec<usize>, Vec<usize>) = (0..self.shapes.len())
+            .filter(|b| !self.shapes[*b].is_empty())
+            .partition(|b| inside[*b]);
+        let meets = |a: usize| others.iter().any(|b| self.pairing.has(a, *b));
+        match self.walls.is_empty() {
+            true => own.into_iter().any(meets),
+            false => !own.is_empty(),
+        }
+    }
+
+    /// The pairs of the pieces of a body and another, or a wall.
+    fn pieces_of(&self, a: usize, second: Other) -> impl Iterator<Item = ContactPair> + use<> {
+        let others = match second {
+            Other::Body(b) => self.shapes[b].len(),
+            Other::Wall(_) => 1,
+        };
+        (0..self.shapes[a].len()).flat_map(move |i| {
+            (0..others).map(move |j| ContactPair {
+                first: a,
+                second,
+                pieces: [i, j],
+            })
+        })
     }
 
     /// Convex pieces of body `b`: itself, if it is convex.
@@ -97,22 +149,32 @@ impl Contacts {
         }
     }
 
-    /// Where the surfaces of pair `k` are near, the bodies being at `poses`; all places with a gap under `distance` (m) and some beyond,
+    /// Where the surfaces of a pair are near, the bodies being at `poses`; all places with a gap under `distance` (m) and some beyond,
     /// as far as bodies may come in a step.
     ///
     /// # Errors
     /// A signed distance that can't be found.
-    pub fn points(&self, k: usize, poses: &[Pose], distance: f64) -> Result<Vec<ContactPoint>> {
-        self.points_within(k, poses, distance + self.ahead(k))
+    pub fn points(
+        &self,
+        pair: &ContactPair,
+        poses: &[Pose],
+        distance: f64,
+    ) -> Result<Vec<ContactPoint>> {
+        self.points_within(pair, poses, distance + self.ahead(pair))
     }
 
     /// The same, of all places with a gap under `reach` (m) and no others.
     ///
     /// # Errors
     /// As [`Contacts::points`].
-    pub fn points_within(&self, k: usize, poses: &[Pose], reach: f64) -> Result<Vec<ContactPoint>> {
-        let a = self.pairs[k].first;
-        match self.solids(k) {
+    pub fn points_within(
+        &self,
+        pair: &ContactPair,
+        poses: &[Pose],
+        reach: f64,
+    ) -> Result<Vec<ContactPoint>> {
+        let a = pair.first;
+        match self.solids(pair) {
             Some((first, Partner::Wall(wall))) => against_wall(first, wall, &poses[a], reach),
             Some((first, Partner::Body(b, second))) => {
                 between(first, second, &poses[a], &poses[b], reach)
@@ -122,18 +184,18 @@ impl Contacts {
     }
 
     /// How far beyond the distance asked for [`Contacts::points`] looks, m.
-    pub fn ahead(&self, k: usize) -> f64 {
-        match self.solids(k) {
+    pub fn ahead(&self, pair: &ContactPair) -> f64 {
+        match self.solids(pair) {
             Some((first, Partner::Wall(_))) => AHEAD * first.radius(),
             Some((first, Partner::Body(_, second))) => AHEAD * first.radius().min(second.radius()),
             None => 0.0,
         }
     }
 
-    /// How deep the surfaces of pair `k` may overlap before the way out may lead through the other side, m: half the thickness of the
+    /// How deep the surfaces of a pair may overlap before the way out may lead through the other side, m: half the thickness of the
     /// thinner body, or the least radius of those that are round. Of a wall, that of its body, which could be deeper.
-    pub fn halfway(&self, k: usize) -> f64 {
-        match self.solids(k) {
+    pub fn halfway(&self, pair: &ContactPair) -> f64 {
+        match self.solids(pair) {
             Some((first, Partner::Wall(_))) => half_thickness(first).1,
             Some((first, Partner::Body(_, second))) => {
                 match (half_thickness(first), half_thickness(second)) {
@@ -146,16 +208,16 @@ impl Contacts {
         }
     }
 
-    /// The speed at which the surfaces of pair `k` come nearer at most, m/s, of bodies at `poses` with these spatial twists: that of
+    /// The speed at which the surfaces of a pair come nearer at most, m/s, of bodies at `poses` with these spatial twists: that of
     /// their middles, and what either adds by turning; not negative.
-    pub fn closing(&self, k: usize, poses: &[Pose], twists: &[Vec6]) -> f64 {
-        let a = self.pairs[k].first;
+    pub fn closing(&self, pair: &ContactPair, poses: &[Pose], twists: &[Vec6]) -> f64 {
+        let a = pair.first;
         let middle = |shape: &ContactShape, b: usize| {
             let center = shape.ball_at(&poses[b]).center;
             let turning = angular(&twists[b]).norm() * lever(shape);
             (point_velocity(&twists[b], &center), turning)
         };
-        let speed = match self.solids(k) {
+        let speed = match self.solids(pair) {
             Some((first, Partner::Wall(wall))) => {
                 let (velocity, turning) = middle(first, a);
                 turning - wall.normal.dot(&velocity)
@@ -170,9 +232,33 @@ impl Contacts {
         speed.max(0.0)
     }
 
-    /// The shapes of pair `k`.
-    fn solids(&self, k: usize) -> Option<(&ContactShape, Partner<'_>)> {
-        let (pair, [i, j]) = (&self.pairs[k], self.parts[k]);
+    /// What a body has of [`Contacts::ahead`] at most, m: that of a pair is no more than the sum of both, or twice that of a body and a wall.
+    pub fn share_ahead(&self, b: usize) -> f64 {
+        let radii = self.shapes[b].iter().map(ContactShape::radius);
+        0.5 * AHEAD * radii.fold(0.0, f64::max)
+    }
+
+    /// The same of [`Contacts::halfway`].
+    pub fn share_halfway(&self, b: usize) -> f64 {
+        let halves = self.shapes[b].iter().map(|s| half_thickness(s).1);
+        halves.fold(0.0, f64::max)
+    }
+
+    /// The same of [`Contacts::closing`], m/s, of a body at `pose` with this spatial twist.
+    pub fn share_closing(&self, b: usize, pose: &Pose, twist: &Vec6) -> f64 {
+        let speed = |shape: &ContactShape| {
+            let center = shape.ball_at(pose).center;
+            point_velocity(twist, &center).norm() + angular(twist).norm() * lever(shape)
+        };
+        let speeds = self.shapes[b].iter().map(speed);
+        // What isn't a number stays; with room for rounding.
+        let most = speeds.fold(0.0, |a: f64, x| if a.is_nan() || x <= a { a } else { x });
+        most * (1.0 + 1e-9)
+    }
+
+    /// The shapes of a pair.
+    fn solids(&self, pair: &ContactPair) -> Option<(&ContactShape, Partner<'_>)> {
+        let [i, j] = pair.pieces;
         let first = self.shapes[pair.first].get(i)?;
         let second = match pair.second {
             Other::Wall(w) => Partner::Wall(&self.walls[w]),

@@ -16,6 +16,7 @@
 
 use super::fluid::{self, FluidMomenta};
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
+use super::island_matrix::IslandMatrix;
 use super::linearisation::Water;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Parameters, Slopes};
@@ -346,7 +347,7 @@ impl Linearisation<'_> {
         .collect()
     }
 
-    /// ∂f/∂v, column by column.
+    /// ∂f/∂v.
     ///
     /// # Errors
     /// As [`Linearisation::force`].
@@ -355,16 +356,25 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         control: &DVector<f64>,
     ) -> Result<DMatrix<f64>> {
+        Ok(self.force_velocity_blocks(v, control)?.dense())
+    }
+
+    /// The same by islands.
+    pub(super) fn force_velocity_blocks(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+    ) -> Result<IslandMatrix> {
         let islands = self.islands();
         let changes = islands.changes();
         let changed = match (self.acting(), &self.fluid) {
-            (Some(water), FluidMomenta::Coupled(_)) => {
+            (Some(water), FluidMomenta::Coupled(_) | FluidMomenta::Scattered(_)) => {
                 (water.linearised).gradient_columns(&self.through_water(v))?
             }
             _ => vec![Vec::new(); changes.len()],
         };
         let found = self.force_jvp(v, control, &changes, &changed);
-        Ok(islands.matrix(&found))
+        Ok(IslandMatrix::new(islands, &found))
     }
 
     /// Transpose of [`Linearisation::force`] in all its arguments: the gradient of `ẑᵀ f(q, v, u)`.

@@ -1,8 +1,8 @@
 //! Contact among bodies and with walls: which surfaces may touch, by which law, and where they are near.
 
-use super::{Parameter, Parameters};
+use super::{ContactLaws, Parameter, Parameters};
 use crate::adjoint::contact::{ContactBar, Law, PointState, Rates, positive};
-use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench, six};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::contact::{ContactPair, ContactPoint, Contacts};
 use serde::Serialize;
 
@@ -13,8 +13,8 @@ pub struct ContactModel {
     pub shapes: Contacts,
     /// Shapes with a parameter of theirs changed.
     pub changed: Vec<ChangedShape>,
-    /// Law of each pair, in the order of [`Contacts::pairs`]; stiffness, dissipation and frictions are parameters and stand there.
-    pub laws: Vec<Law>,
+    /// Law of each pair.
+    pub laws: ContactLaws,
     /// Whether the stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
     /// Whether there is water between the surfaces, which has no flow where they meet.
@@ -52,8 +52,8 @@ pub struct ContactGap {
 /// A place where two surfaces are near at a configuration.
 #[derive(Clone, Debug)]
 pub struct PairContact {
-    /// The pair, by its number in [`Contacts::pairs`].
-    pub pair: usize,
+    /// The pair.
+    pub pair: ContactPair,
     /// Body to which the normal points.
     pub first: usize,
     /// The other body; none for a wall.
@@ -78,30 +78,29 @@ pub(super) fn sharpened(law: Law, n: usize) -> Law {
 
 impl ContactModel {
     /// The gap of each pair, in the order of [`Contacts::pairs`].
-    pub fn gaps(&self) -> Vec<ContactGap> {
-        let gap = |(pair, law): (&ContactPair, &Law)| {
-            let bodies = [Some(pair.first), pair.second_body()];
-            let radii = bodies
-                .into_iter()
-                .flatten()
-                .filter_map(|b| self.shapes.radius(b));
-            let smaller = radii.fold(f64::INFINITY, f64::min);
+    pub fn gaps(&self) -> impl Iterator<Item = ContactGap> {
+        self.shapes.pairs().map(|pair| {
+            let gap = self.laws.of(&pair).gap;
             ContactGap {
                 first: pair.first,
                 second: pair.second_body(),
-                gap: law.gap,
-                part: law.gap / (2.0 * smaller),
+                gap,
+                part: gap / (2.0 * self.laws.smaller(&pair)),
             }
-        };
-        self.shapes
-            .pairs()
-            .iter()
-            .zip(&self.laws)
-            .map(gap)
-            .collect()
+        })
     }
 
-    pub(super) fn law(&self, pair: usize, parameters: &Parameters) -> Law {
+    /// The pairs whose surfaces may be as near as `beyond` (m) past where their forces set in, and some that aren't: `beyond` tells what a body has of that, so
+    /// that of a pair it is no more than the sum of both, or twice that of a body and a wall. In the order of [`Contacts::pairs`].
+    pub(super) fn near(&self, poses: &[Pose], beyond: impl Fn(usize) -> f64) -> Vec<ContactPair> {
+        let laws = &self.laws;
+        // A pair's gap is one of its bodies'.
+        let widest = (0..poses.len()).map(|b| laws.widest(b)).fold(0.0, f64::max);
+        let onset = 0.5 * (widest + laws.common.width);
+        self.shapes.near(poses, |b| onset + beyond(b))
+    }
+
+    pub(super) fn law(&self, pair: &ContactPair, parameters: &Parameters) -> Law {
         let [
             stiffness,
             dissipation,
@@ -115,7 +114,7 @@ impl ContactModel {
             friction,
             torsional_friction,
             rolling_friction,
-            ..self.laws[pair]
+            ..self.laws.of(pair)
         }
     }
 }

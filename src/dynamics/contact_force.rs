@@ -13,9 +13,9 @@ use super::{
 use crate::Result;
 use crate::adjoint::contact::{Push, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::adjoint::lie::{Pose, Vec6, angular, point_velocity};
-use crate::contact::ContactPoint;
+use crate::contact::{ContactPair, ContactPoint};
 use crate::multibody::{Cotangents, Virtual};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Contacts at places where surfaces are near, of bodies that end a step with these twists: all where something presses, or where
 /// surfaces are no more than `slack` (m) farther apart than the gap at which they touch.
@@ -51,34 +51,34 @@ impl System {
         parameters: &Parameters,
         poses: &[Pose],
     ) -> Result<Vec<PairContact>> {
-        let pairs = self.contact.as_ref().map_or(0, |m| m.laws.len());
         let mut out = Vec::new();
-        for k in 0..pairs {
-            out.extend(self.pair_points(parameters, poses, k, 1, 0.0)?);
+        if let Some(model) = &self.contact {
+            for pair in model.near(poses, |b| model.shapes.share_ahead(b)) {
+                out.extend(self.pair_points(parameters, poses, &pair, 1, 0.0)?);
+            }
         }
         Ok(out)
     }
 
-    /// Those of pair `k`, whose law is sharpened `sharpness` times; as far as `travel` (m) beyond where it sets in, if that is farther than
+    /// Those of a pair whose law is sharpened `sharpness` times; as far as `travel` (m) beyond where it sets in, if that is farther than
     /// one always looks.
     pub(super) fn pair_points(
         &self,
         parameters: &Parameters,
         poses: &[Pose],
-        k: usize,
+        pair: &ContactPair,
         sharpness: usize,
         travel: f64,
     ) -> Result<Vec<PairContact>> {
         let Some(model) = &self.contact else {
             return Ok(Vec::new());
         };
-        let pair = &model.shapes.pairs()[k];
-        let law = model.law(k, parameters);
+        let law = model.law(pair, parameters);
         let onset = law.gap + law.width;
-        let reach = onset + model.shapes.ahead(k).max(travel);
-        let found = model.shapes.points_within(k, poses, reach)?;
+        let reach = onset + model.shapes.ahead(pair).max(travel);
+        let found = model.shapes.points_within(pair, poses, reach)?;
         let place = |point: ContactPoint| PairContact {
-            pair: k,
+            pair: *pair,
             first: pair.first,
             second: pair.second_body(),
             law: sharpened(law, sharpness),
@@ -137,21 +137,43 @@ impl Evaluation<'_> {
 
     /// Sizes of the generalised forces of contact, without what cancels among them: what their rounding is relative to.
     pub(super) fn contact_effort(&self, v: &DVector<f64>) -> DVector<f64> {
-        let tree = &self.system.tree;
         let twists = self.twists(v);
         let mut out = self.damping_effort(v);
         for t in &self.contact_points {
             let push = contact_force(&t.law, &t.point_state(&twists));
             if push != Push::default() {
-                let mut wrenches = vec![Vec6::zeros(); self.system.len()];
-                t.exchange(&t.wrench(&push.force, &push.torque), &mut wrenches);
-                out += tree.project(&self.kinematics.columns, wrenches).abs();
+                let wrench = t.wrench(&push.force, &push.torque);
+                self.add_effort(t, &wrench, &mut out);
             }
         }
         for (limit, [lower, upper]) in self.limit_forces(v) {
             out[limit.v] += lower.abs() + upper.abs();
         }
         out
+    }
+
+    /// Adds the sizes of the generalised forces of one contact, which what carries both of its bodies doesn't feel.
+    fn add_effort(&self, t: &PairContact, wrench: &Vec6, out: &mut DVector<f64>) {
+        let tree = &self.system.tree;
+        let carries = |body: Option<usize>, a: usize| body.is_some_and(|b| tree.carries(a, b));
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        let sides = [
+            (Some(t.first), t.second, 1.0),
+            (t.second, Some(t.first), -1.0),
+        ];
+        for (own, other, sign) in sides {
+            let chain = own.into_iter().flat_map(|b| tree.carrying(b));
+            for a in chain.filter(|a| !carries(other, *a)) {
+                for (column, k) in tree.links()[a].terms() {
+                    let force = sign * self.kinematics.columns[column].dot(wrench);
+                    match found.iter_mut().find(|(i, _)| *i == k) {
+                        Some((_, sum)) => *sum += force,
+                        None => found.push((k, force)),
+                    }
+                }
+            }
+        }
+        found.iter().for_each(|(k, force)| out[*k] += force.abs());
     }
 
     /// Tangent of [`Evaluation::contact_force`] (the user's coordinates) along `dv`.
@@ -167,17 +189,6 @@ impl Evaluation<'_> {
         let mut out = tree.project(&self.kinematics.columns, wrenches);
         for l in &self.limits {
             out[l.v] += l.forces_jvp(self.q[l.q], v[l.v], dv[l.v]);
-        }
-        out
-    }
-
-    /// ∂g/∂v in the user's coordinates, column by column: symmetric, negative semi-definite.
-    pub(super) fn contact_jacobian(&self, v: &DVector<f64>) -> DMatrix<f64> {
-        let n = v.len();
-        let mut out = DMatrix::zeros(n, n);
-        for k in 0..n {
-            let unit = DVector::from_fn(n, |i, _| f64::from(i == k));
-            out.set_column(k, &self.contact_force_jvp(v, &unit));
         }
         out
     }

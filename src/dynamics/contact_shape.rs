@@ -31,7 +31,7 @@ impl System {
                 let reach = at.point.gap + near;
                 // Where nothing is found any more nothing is known of a change.
                 let found = changed.shapes[side]
-                    .points_within(at.pair, poses, reach)
+                    .points_within(&at.pair, poses, reach)
                     .ok()?;
                 let same = nearest(&found, &at.point)?;
                 let apart = (same.position - at.point.position).norm();

@@ -38,9 +38,13 @@ impl Evaluation<'_> {
     pub(super) fn damping_effort(&self, v: &DVector<f64>) -> DVector<f64> {
         let tree = &self.system.tree;
         let mut out = DVector::zeros(v.len());
+        // The first velocities of all islands at once, which don't reach one another, then the second.
+        let parts = self.damped_islands().changes();
         self.dampers(|force, control| {
-            for k in (0..v.len()).filter(|k| v[*k] != 0.0) {
-                let part = DVector::from_fn(v.len(), |i, _| if i == k { v[k] } else { 0.0 });
+            for part in parts.iter().map(|change| change.component_mul(v)) {
+                if part.iter().all(|x| *x == 0.0) {
+                    continue;
+                }
                 let twists = tree.twists(&self.kinematics, &part);
                 let mut loads = Loads::zeros(twists.len(), v.len());
                 force.add(&self.moving(&twists, &part, control), &mut loads);

@@ -1,6 +1,7 @@
 //! Everything that depends on the configuration alone: kinematics, momenta per unit velocity, mass matrix.
 
 use super::fluid::FluidMomenta;
+use super::island_matrix::IslandMatrix;
 use super::{JointLimit, PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
 use crate::coupling::CouplingReport;
@@ -35,6 +36,8 @@ pub struct Evaluation<'a> {
     pub(super) fluid: FluidMomenta<'a>,
     /// M(q), once it has been asked for ([`Evaluation::mass_matrix`]).
     pub(super) mass_matrix: OnceLock<DMatrix<f64>>,
+    /// The same by islands ([`Evaluation::mass_blocks`]).
+    pub(super) mass_blocks: OnceLock<IslandMatrix>,
     /// Generalised momentum at v = 0, from the current: of the water, and of the bodies relative to what may drift.
     pub rest_momentum: DVector<f64>,
     report: CouplingReport,
@@ -172,6 +175,7 @@ impl<'a> Evaluation<'a> {
             rigid: system.rigid_inertias(parameters),
             fluid,
             mass_matrix: OnceLock::new(),
+            mass_blocks: OnceLock::new(),
             rest_momentum: DVector::zeros(system.tree.velocities()),
             report,
         };

@@ -8,7 +8,9 @@ mod body;
 mod body_loads;
 mod body_parameters;
 mod contact;
+mod contact_curvature;
 mod contact_force;
+mod contact_law;
 mod contact_shape;
 mod cotangents;
 mod damping;
@@ -19,10 +21,12 @@ mod fluid;
 pub mod force;
 mod inertia;
 mod integrator;
+mod island_matrix;
 mod islands;
 mod limit;
 mod linearisation;
 mod momentum;
+mod motions;
 mod parameters;
 mod recoil;
 mod shape;
@@ -31,11 +35,13 @@ mod slopes;
 mod stiffness;
 mod symmetry;
 mod system;
+mod ties;
 
 pub use armature::Armature;
 pub use body::{BodyData, SiteData};
 pub(crate) use body_parameters::body_places;
 pub use contact::{ChangedShape, ContactForce, ContactGap, ContactModel, Dual, PairContact};
+pub use contact_law::ContactLaws;
 pub use cotangents::ForceCotangents;
 pub use drift::Drift;
 pub use evaluation::Evaluation;
@@ -47,6 +53,7 @@ pub use integrator::{
 };
 pub use limit::JointLimit;
 pub use linearisation::Linearisation;
+pub use motions::Motions;
 pub use parameters::{
     BodyValues, Declarations, Declared, Entry, Owner, Parameter, Parameters, Range, Typical,
 };

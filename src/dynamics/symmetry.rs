@@ -3,8 +3,8 @@
 //! Where all joints to the world that a group of bodies hangs on allow one and the same rigid motion, and no wall of the water stands in its way, it changes
 //! no kinetic energy, and the momentum along it stays where nothing outside acts.
 
-use super::Drive;
 use super::force::Outside;
+use super::{Drive, Motions};
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::multibody::{Link, Tree};
 use nalgebra::DMatrix;
@@ -23,8 +23,8 @@ pub struct Group {
 /// Rigid motions that are free.
 #[derive(Clone, Debug)]
 pub struct FreeMotions {
-    /// Frame velocities, velocities × motions.
-    pub velocities: DMatrix<f64>,
+    /// Frame velocities.
+    pub velocities: Motions,
     /// The spatial twist of each.
     pub twists: Vec<Vec6>,
 }
@@ -96,7 +96,7 @@ fn allowed(root: &Link) -> DMatrix<f64> {
 
 /// The motions that are free for each group of bodies; a group with a driven joint to the world has none.
 pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMotions {
-    let (mut columns, mut twists): (Vec<Vec<f64>>, Vec<Vec6>) = Default::default();
+    let (mut each, mut twists): (Vec<Vec<(usize, f64)>>, Vec<Vec6>) = Default::default();
     for Group { roots, refused } in groups {
         let free = |b: &usize| drives[*b] == Drive::Free && tree.is_single(*b);
         if roots.is_empty() || !roots.iter().all(free) {
@@ -104,23 +104,21 @@ pub fn free_motions(tree: &Tree, drives: &[Drive], groups: &[Group]) -> FreeMoti
         }
         let roots: Vec<&Link> = roots.iter().map(|b| &tree.links()[*b]).collect();
         for twist in common_twists(&roots, refused) {
-            let mut column = vec![0.0; tree.velocities()];
+            let mut motion = Vec::new();
             for root in &roots {
                 // Frame velocities of the twist: least squares, which is exact here.
                 let basis = allowed(root);
                 let right = DMatrix::from_column_slice(6, 1, twist.as_slice());
                 if let Ok(hat) = basis.svd(true, true).solve(&right, ZERO) {
-                    for (i, x) in root.v.clone().zip(hat.iter()) {
-                        column[i] = *x;
-                    }
+                    motion.extend(root.v.clone().zip(hat.iter().copied()));
                 }
             }
-            columns.push(column);
+            each.push(motion);
             twists.push(twist);
         }
     }
     FreeMotions {
-        velocities: DMatrix::from_fn(tree.velocities(), columns.len(), |i, j| columns[j][i]),
+        velocities: Motions::new(tree.velocities(), each),
         twists,
     }
 }

@@ -1,12 +1,14 @@
 //! A system: the tree, its bodies' constants, and the coupling through the water.
 
 use super::force::{ForceModel, Moving, Place, Streams};
-use super::{Armature, BodyData, ContactModel, Drift, JointLimit, Parameters, Shapes, SiteData};
+use super::{
+    Armature, BodyData, ContactModel, Drift, JointLimit, Motions, Parameters, Shapes, SiteData,
+};
 use crate::adjoint::lie::{Vec3, Vec6};
 use crate::coupling::Coupling;
 use crate::multibody::Tree;
 use crate::scene::Motion;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use std::sync::Arc;
 
 /// What moves a joint.
@@ -52,8 +54,8 @@ pub struct System {
     /// Limits of joints.
     pub limits: Vec<JointLimit>,
     /// Frame velocities of rigid motions of all bodies, or of all that feel one another through the water, that no joint and no wall of the water stands
-    /// against: nv × k. The momentum along each is theirs to keep.
-    pub symmetric: DMatrix<f64>,
+    /// against. The momentum along each is theirs to keep.
+    pub symmetric: Motions,
 }
 
 impl System {

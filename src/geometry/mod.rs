@@ -16,6 +16,7 @@
 
 mod beneath;
 mod boxes;
+mod broad;
 mod check;
 pub(crate) mod convex;
 mod exact;
@@ -26,6 +27,7 @@ mod interior;
 mod mass;
 mod mesh;
 mod opposite;
+mod pairing;
 #[cfg(test)]
 mod parry;
 mod points;
@@ -41,6 +43,7 @@ mod wall;
 pub(crate) mod weld;
 
 pub(crate) use beneath::Beneath;
+pub(crate) use broad::{Neighbours, Region};
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
 pub(crate) use convex::Field;
 pub use convex::Solid;
@@ -54,6 +57,7 @@ pub(crate) use mass::impossible_inertia;
 pub(crate) use mesh::check_scale;
 pub use mesh::{Edge, TriMesh};
 pub(crate) use opposite::Opposite;
+pub use pairing::Pairing;
 pub use points::Ball;
 #[cfg(feature = "meshio")]
 pub(crate) use points::bounds;

@@ -60,6 +60,13 @@ impl MeshTree {
         edges.iter().sum::<f64>() / 3.0
     }
 
+    /// No mean edge length around a face is more than this, m.
+    pub fn longest_edge(&self) -> f64 {
+        let longest = self.edge_at_vertex.iter().copied().fold(0.0, f64::max);
+        // With room for the rounding of a mean.
+        longest * (1.0 + 1e-12)
+    }
+
     /// Number of faces.
     pub fn len(&self) -> usize {
         self.triangles.len()

@@ -15,8 +15,10 @@
 
 mod articulated;
 mod joint;
+mod joint_blocks;
 mod tree;
 
 pub use articulated::{Articulated, Indefinite};
 pub use joint::{Joint, JointModel, JointMotion, Plane, Refused};
+pub use joint_blocks::JointBlocks;
 pub use tree::{Cotangents, Fields, Kinematics, Link, Tree, Virtual};

@@ -1,6 +1,6 @@
 //! The kinematic tree and the reverse of its velocity fields.
 
-use super::JointModel;
+use super::{JointBlocks, JointModel};
 use crate::adjoint::lie::{
     Mat3, Pose, Vec3, Vec6, angular, cross_force, cross_motion, exp_jacobian, exp_jacobian_inverse,
     exp_jacobian_inverse_jvp, exp_matrix, point_velocity, six,
@@ -350,14 +350,14 @@ impl Tree {
         out
     }
 
-    /// Derivatives of [`Tree::chart_momentum`] with respect to q, xi and p̂, nv × nv each: joint by joint, from the transposes of its entries.
+    /// Derivatives of [`Tree::chart_momentum`] with respect to q, xi and p̂: joint by joint, from the transposes of its entries.
     pub fn chart_momentum_slopes(
         &self,
         q: &DVector<f64>,
         xi: &DVector<f64>,
         hat: &DVector<f64>,
-    ) -> [DMatrix<f64>; 3] {
-        self.blocks(|l, z| {
+    ) -> [JointBlocks; 3] {
+        self.joint_blocks(|l, z| {
             l.joint
                 .chart_momentum_vjp(l.of_q(q), l.of_v(xi), l.of_v(hat), z)
         })
@@ -374,30 +374,29 @@ impl Tree {
         &self,
         row: impl Fn(&Link, &[f64]) -> [Vec<f64>; N],
     ) -> [DMatrix<f64>; N] {
-        let n = self.velocities();
-        let mut out: [DMatrix<f64>; N] = std::array::from_fn(|_| DMatrix::zeros(n, n));
-        for l in self.own() {
-            let mut unit = vec![0.0; l.v.len()];
-            for k in 0..l.v.len() {
+        self.joint_blocks(row).map(|blocks| blocks.dense())
+    }
+
+    /// The same, without the zeros between joints.
+    pub fn joint_blocks<const N: usize>(
+        &self,
+        row: impl Fn(&Link, &[f64]) -> [Vec<f64>; N],
+    ) -> [JointBlocks; N] {
+        let mut out = std::array::from_fn(|_| JointBlocks::new(self.velocities()));
+        for l in self.own().filter(|l| !l.v.is_empty()) {
+            let n = l.v.len();
+            let mut blocks: [DMatrix<f64>; N] = std::array::from_fn(|_| DMatrix::zeros(n, n));
+            let mut unit = vec![0.0; n];
+            for k in 0..n {
                 unit[k] = 1.0;
-                for (out, row) in out.iter_mut().zip(row(l, &unit)) {
-                    for (j, x) in l.v.clone().zip(row) {
-                        out[(l.v.start + k, j)] = x;
-                    }
+                for (block, row) in blocks.iter_mut().zip(row(l, &unit)) {
+                    block.row_mut(k).copy_from_slice(&row);
                 }
                 unit[k] = 0.0;
             }
-        }
-        out
-    }
-
-    /// Product of a matrix with a block for each joint on the diagonal ([`Tree::blocks`]) and another.
-    pub fn blocks_times(&self, blocks: &DMatrix<f64>, m: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = m.clone();
-        for l in self.links.iter().filter(|l| !l.v.is_empty()) {
-            let (start, n) = (l.v.start, l.v.len());
-            let own = blocks.view((start, start), (n, n)) * m.rows(start, n);
-            out.rows_mut(start, n).copy_from(&own);
+            for (out, block) in out.iter_mut().zip(blocks) {
+                out.push(l.v.start, block);
+            }
         }
         out
     }

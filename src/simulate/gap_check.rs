@@ -100,11 +100,8 @@ impl<'a> Across<'a> {
         let distance = |shift: Vec3| {
             let mut moved = poses.to_vec();
             moved[body].translation += shift;
-            let all = simulator.gaps().all(&moved);
-            let same = all
-                .iter()
-                .find(|g| (g.first, g.second) == (gap.first, gap.second));
-            same.map_or(0.0, |g| g.distance)
+            let there = simulator.gaps().between((gap.first, gap.second), &moved);
+            there.map_or(0.0, |g| g.distance)
         };
         let slope = |axis: usize| {
             let shift = Vec3::ith(axis, step);

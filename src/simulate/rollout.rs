@@ -187,8 +187,7 @@ impl Rollout {
             .filter(|r| !r.passed().is_empty());
         let first = passing.next()?;
         let name = |b: usize| format!("body {:?}", system.bodies[b].name);
-        let model = system.contact.as_ref();
-        let pair = model.and_then(|m| m.shapes.pairs().get(*first.passed().pairs.first()?));
+        let pair = first.passed().pairs.first();
         let limit = first
             .passed()
             .limits

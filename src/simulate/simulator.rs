@@ -4,7 +4,7 @@ use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Sett
 use crate::adjoint::lie::{Mat3, Mat6, Pose};
 use crate::assembly::{self, Assembled, Choices};
 use crate::coupling::CouplingReport;
-use crate::dynamics::{ContactGap, ContactModel, FreeMotions, Parameters, Stepper, System};
+use crate::dynamics::{ContactGap, FreeMotions, Parameters, Stepper, System};
 use crate::geometry::{Gap, Gaps, Other, TriMesh};
 use crate::scene::Scene;
 use crate::water::{Carried, Clearance, GapError, Subject, Surface, world_axes};
@@ -138,7 +138,7 @@ impl Simulator {
     /// The gaps at which surfaces are taken to touch; none where the scene has no contact.
     pub fn contact_gaps(&self) -> Vec<ContactGap> {
         let contact = self.system().contact.as_ref();
-        contact.map(ContactModel::gaps).unwrap_or_default()
+        contact.map_or(Vec::new(), |model| model.gaps().collect())
     }
 
     /// The fidelity in use: what was asked for, or what `Auto` chose.
@@ -219,7 +219,7 @@ impl Simulator {
         }
         let assembled = Arc::make_mut(&mut self.assembled);
         if let Some(contact) = &mut assembled.system.contact {
-            contact.laws.iter_mut().for_each(|law| law.width *= factor);
+            contact.laws.common.width *= factor;
             assembled.parameters.soften_contact(factor);
         }
         Ok(())
@@ -304,7 +304,7 @@ impl Simulator {
     /// The pairs that have films at these poses.
     pub(super) fn films(&self, poses: &[Pose]) -> Vec<(usize, Other)> {
         let model = &self.assembled.water.gap_model;
-        let gaps = self.gaps().all(poses);
+        let gaps = self.gaps().within(poses, self.widest_film());
         let film = |gap: &&Gap| model.reach(gap).is_some_and(|reach| gap.distance < reach);
         let pairs = gaps.iter().filter(film).map(|g| (g.first, g.second));
         pairs.collect()

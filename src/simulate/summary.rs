@@ -73,7 +73,8 @@ impl Rollout {
                 .fold(0.0, f64::max),
             min_gap: self.nearest().map(|(_, gap)| gap.distance),
             gaps: self.gap_report(),
-            contact_gap: (self.simulator.contact_gaps().iter())
+            contact_gap: (self.simulator.system().contact.iter())
+                .flat_map(|model| model.gaps())
                 .map(|g| g.gap)
                 .reduce(f64::max),
             cut_steps: pieces.iter().filter(|n| **n > 1).count(),

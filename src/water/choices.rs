@@ -8,7 +8,7 @@ use super::surface::{Meshing, Surface, surface};
 use crate::Result;
 use crate::boundary::{self, Depth};
 use crate::coupling::full::{FullSolver, Preconditioner, SolveSettings};
-use crate::scene::{Preset, Scene};
+use crate::scene::{Body, Preset, Scene};
 use serde::{Deserialize, Serialize};
 
 /// How the water is computed, everything decided.
@@ -146,11 +146,32 @@ impl WaterChoices {
     }
 }
 
-/// The surfaces of all bodies of a scene, each in its body's frame; none for a body without a shape.
+/// The surfaces of all bodies of a scene, each in its body's frame; none for a body without a shape. Equal shapes are meshed once.
 ///
 /// # Errors
 /// A mesh that can't be read, or a shape that can't be meshed.
 pub(crate) fn surfaces(scene: &Scene, choices: &WaterChoices) -> Result<Vec<Option<Surface>>> {
-    let (meshing, bodies) = (choices.meshing(), scene.bodies.iter());
-    bodies.map(|body| surface(body, meshing, 1.0)).collect()
+    let meshing = choices.meshing();
+    let mut out: Vec<Option<Surface>> = Vec::with_capacity(scene.bodies.len());
+    // The first bodies of each shape.
+    let mut firsts: Vec<usize> = Vec::new();
+    for (b, body) in scene.bodies.iter().enumerate() {
+        let known = firsts
+            .iter()
+            .find(|a| is_shaped_as(&scene.bodies[**a], body));
+        let made = match known {
+            Some(a) => out[*a].clone(),
+            None => {
+                firsts.push(b);
+                surface(body, meshing, 1.0)?
+            }
+        };
+        out.push(made);
+    }
+    Ok(out)
+}
+
+/// Whether two bodies have the same surface in their frames.
+fn is_shaped_as(a: &Body, b: &Body) -> bool {
+    a.shape == b.shape && a.shape_at == b.shape_at && a.refine == b.refine
 }

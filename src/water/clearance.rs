@@ -6,7 +6,7 @@ use super::resolved::{Resolved, narrowest};
 use super::surface::{Surface, overlaps, touches};
 use crate::adjoint::lie::Pose;
 use crate::error::readable;
-use crate::geometry::{Gap, Gaps, Other, Share, overlap_error};
+use crate::geometry::{Gap, Gaps, Other, Pairing, Share, overlap_error};
 use crate::multibody::Tree;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -56,6 +56,21 @@ pub(crate) struct Clearance {
     pub resolved_edges: f64,
 }
 
+/// The nearest joint that moves each body: those with the same one don't move relative to one another.
+fn movers(scene: &Scene, tree: &Tree) -> Vec<usize> {
+    let mut out: Vec<usize> = Vec::with_capacity(scene.bodies.len());
+    for (b, (body, link)) in scene.bodies.iter().zip(tree.links()).enumerate() {
+        let held = body.locked && body.motion.is_none();
+        out.push(match (link.columns.is_empty() || held, link.parent) {
+            (false, _) => b,
+            (true, Some(parent)) => out[parent],
+            // The world.
+            (true, None) => usize::MAX,
+        });
+    }
+    out
+}
+
 impl Clearance {
     pub fn new(scene: &Scene, surfaces: &[Option<Surface>], tree: &Tree) -> Result<Self> {
         let bodies = scene.bodies.len();
@@ -63,37 +78,18 @@ impl Clearance {
             .iter()
             .map(|s| s.as_ref().map(|s| &s.mesh))
             .collect();
-        let movers = |b: usize| -> Vec<usize> {
-            let carry = |a: &usize| {
-                let held = scene.bodies[*a].locked && scene.bodies[*a].motion.is_none();
-                tree.carries(*a, b) && !tree.links()[*a].columns.is_empty() && !held
-            };
-            (0..bodies).filter(carry).collect()
-        };
-        let of: Vec<Vec<usize>> = (0..bodies).map(movers).collect();
         let carriers = scene.carriers();
         let declared = carriers.overlapping();
-        let (mut moving, mut rigid, mut shares) = (Vec::new(), Vec::new(), Vec::new());
-        for a in 0..bodies {
-            for b in a + 1..bodies {
-                let pair = (a, b);
-                if declared.contains(&pair) {
-                    shares.extend(Share::new(&meshes, pair));
-                } else if of[a] == of[b] {
-                    rigid.push(pair);
-                } else {
-                    moving.push(pair);
-                }
-            }
-        }
-        let but = |others: &[(usize, usize)]| [others, &declared].concat();
+        let shares = declared.iter().map(|pair| Share::new(&meshes, *pair));
+        let (shares, movers) = (shares.collect::<Vec<_>>(), movers(scene, tree));
         let solids: Vec<_> = surfaces.iter().map(|s| s.as_ref()?.solid.clone()).collect();
-        let rigid_gaps = Gaps::new(&meshes, &[], &but(&moving))?;
-        let moving_gaps = Gaps::new(&meshes, &scene.walls, &but(&rigid))?;
+        let all = Gaps::new(&meshes, &[], &[])?.by_formula(solids)?;
+        let rigid = Pairing::within(movers.clone()).but(declared.clone());
+        let moving = Pairing::between(movers).but(declared);
         Ok(Self {
-            rigid: rigid_gaps.by_formula(solids.clone())?,
-            moving: moving_gaps.by_formula(solids)?,
-            declared: shares,
+            rigid: all.paired(&[], rigid)?,
+            moving: all.paired(&scene.walls, moving)?,
+            declared: shares.into_iter().flatten().collect(),
             parents: (0..bodies).map(|b| carriers.submerged_parent(b)).collect(),
             names: scene.bodies.iter().map(|b| b.name.clone()).collect(),
             contact: scene.contact.is_some(),
@@ -147,7 +143,8 @@ impl Clearance {
             Other::Body(_) => BY_SOURCES * gap.edge,
             Other::Wall(_) => 0.5 * BY_SOURCES * gap.edge,
         };
-        let all = self.moving.all(poses);
+        let widest = BY_SOURCES * self.moving.longest_edge();
+        let all = self.moving.within(poses, widest);
         for gap in all.iter().filter(|gap| gap.distance < limit(gap)) {
             let (area, energy) = self.film(&self.moving, gap, poses);
             if energy > LOST && gap.distance < THIN * (area / PI).sqrt() {
@@ -335,7 +332,7 @@ impl Clearance {
             if smallest.distance >= coarsest {
                 continue;
             }
-            for gap in self.moving.all(poses) {
+            for gap in self.moving.within(poses, coarsest) {
                 if let Some((ratio, limit)) = narrowest(&self.moving, &gap, poses, resolved)
                     && ratio < 1.0
                     && worst.is_none_or(|w| ratio < w.0)

@@ -102,12 +102,11 @@ impl GapModel {
         if own == 0.0 || clearance.walls < 2 || !matches!(gap.second, Other::Wall(_)) {
             return 0.0;
         }
-        let all = clearance.moving.all(poses);
-        let others = all.iter().filter(|other| {
-            other.first == gap.first
-                && other.second != gap.second
-                && matches!(other.second, Other::Wall(_))
-        });
-        own * others.map(into).fold(0.0, f64::max)
+        let walls = (0..clearance.walls).map(Other::Wall);
+        let others = walls.filter(|other| *other != gap.second);
+        let others = others
+            .filter_map(|other| clearance.moving.between((gap.first, other), poses))
+            .map(|other| into(&other));
+        own * others.fold(0.0, f64::max)
     }
 }

@@ -258,11 +258,7 @@ fn dropped(scene: &Scene, duration: f64) -> hydrograd::Result<Dropped> {
     let first = rollout.samples()[0].energy();
     let mut out = Dropped {
         deepest: f64::INFINITY,
-        bound: model
-            .laws
-            .iter()
-            .map(|l| l.gap)
-            .fold(f64::INFINITY, f64::min),
+        bound: model.gaps().map(|g| g.gap).fold(f64::INFINITY, f64::min),
         kinetic: 0.0,
         turn: 0.0,
         met: false,
@@ -288,14 +284,15 @@ fn dropped(scene: &Scene, duration: f64) -> hydrograd::Result<Dropped> {
             out.turn = out.turn.max(turn);
             *lost = lost.max(0.5 * radius * turn * turn + 0.1 * (moved + radius * turn));
         }
-        for (k, pair) in model.shapes.pairs().iter().enumerate() {
-            for p in model.shapes.points(k, &sample.poses, model.laws[k].gap)? {
+        for pair in model.shapes.pairs() {
+            let gap = model.laws.of(&pair).gap;
+            for p in model.shapes.points(&pair, &sample.poses, gap)? {
                 if p.weight >= 0.5 {
                     out.deepest = out.deepest.min(p.gap);
                 }
                 // Surfaces that slide at v ride τ μ v above the gap.
                 let ride = 0.5 * dt * 4.0;
-                out.met |= p.gap < ride + model.laws[k].gap && pair.second_body().is_some();
+                out.met |= p.gap < ride + gap && pair.second_body().is_some();
             }
         }
     }

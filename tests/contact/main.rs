@@ -2,6 +2,7 @@
 
 mod drops;
 mod geometry;
+mod heaps;
 mod integrators;
 mod joints;
 mod parts;

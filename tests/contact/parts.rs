@@ -88,7 +88,7 @@ fn a_peg_rests_in_a_fork() {
     let simulator = made(&peg());
     let pairs = simulator.system().contact.as_ref().unwrap().shapes.pairs();
     // Three pieces with the peg and with the floor, and the peg with the floor.
-    assert_eq!(pairs.len(), 7);
+    assert_eq!(pairs.count(), 7);
     let rollout = run(&simulator, 300);
     let samples = rollout.samples();
     for sample in samples {

@@ -326,6 +326,43 @@ fn the_smallest_of_many_is_that_of_all() {
     assert!(negative > 5 && negative < 55, "{negative}");
 }
 
+/// Gaps under a distance, and the smallest, are those of all pairs, from clouds to bodies in one another.
+#[test]
+fn many_bodies_are_not_looked_at_in_pairs() {
+    let mut random = Samples::new(24);
+    let meshes = [
+        sphere(0.3, 80),
+        cuboid([0.5, 0.3, 0.2], 100),
+        cuboid([1.0, 1.0, 0.01], 12),
+    ];
+    let list: Vec<Option<&TriMesh>> = (0..70).map(|i| meshes.get(i % 4)).collect();
+    let wall = Wall::rigid([0.0, 0.0, -4.0], [0.0, 0.0, 1.0]);
+    let gaps = Gaps::new(&list, &[wall], &[(2, 0), (5, 4)]).unwrap();
+    for spread in [1.5, 4.0, 9.0, 60.0] {
+        let mut poses: Vec<Pose> = list
+            .iter()
+            .map(|_| {
+                turned(
+                    (vector(&mut random) * 2.0).into(),
+                    (vector(&mut random) * spread).into(),
+                )
+            })
+            .collect();
+        poses[6].translation.x = f64::NAN;
+        let all = gaps.all(&poses);
+        for distance in [0.05, 0.5, 3.0, f64::INFINITY] {
+            let near = all.iter().filter(|g| g.distance < distance).copied();
+            assert_eq!(gaps.within(&poses, distance), near.collect::<Vec<_>>());
+        }
+        let least = all.iter().map(|g| g.distance).fold(f64::INFINITY, f64::min);
+        let found = gaps.smallest(&poses).unwrap().distance;
+        assert!(
+            (found - least).abs() <= 1e-11 * least.abs(),
+            "{found} {least}"
+        );
+    }
+}
+
 #[test]
 fn without_pairs_there_is_no_gap() {
     let ball = sphere(1.0, 80);

@@ -38,7 +38,14 @@ const LAYERS: [(&str, &[&str]); 24] = [
     ("contact", &["adjoint", "geometry", "shape"]),
     (
         "dynamics",
-        &["adjoint", "contact", "coupling", "multibody", "scene"],
+        &[
+            "adjoint",
+            "contact",
+            "coupling",
+            "multibody",
+            "scene",
+            "solver",
+        ],
     ),
     // Controllers: what acts, from what is observed.
     ("policy", &[]),

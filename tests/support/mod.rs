@@ -7,6 +7,7 @@ pub mod command;
 pub mod falling;
 pub mod forward;
 pub mod grasps;
+pub mod heap;
 pub mod reference;
 
 use hydrograd::adjoint::lie::Vec3;

@@ -11,10 +11,12 @@ use super::Stepper;
 use super::plan::{MOST, Plan, Stops};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6, point_velocity};
-use crate::contact::Contacts;
+use crate::contact::ContactPair;
 use crate::dynamics::{ContactModel, Evaluation, PairContact, System};
 use crate::multibody::Kinematics;
 use nalgebra::DVector;
+use std::borrow::Cow;
+use std::cell::OnceCell;
 
 /// Room for a change of speed on the way.
 const ROOM: f64 = 1.25;
@@ -38,6 +40,9 @@ struct Way<'s> {
     system: &'s System,
     q: &'s DVector<f64>,
     v: &'s DVector<f64>,
+    /// [`Way::at`] its start, and its end after a given time, which most pairs ask for.
+    start: OnceCell<(Vec<Pose>, Vec<Vec6>)>,
+    end: OnceCell<(Vec<Pose>, Vec<Vec6>)>,
 }
 
 /// Where two surfaces meet on their way: the speed at which they close there along their normal, m/s.
@@ -45,7 +50,17 @@ struct Meeting {
     speed: f64,
 }
 
-impl Way<'_> {
+impl<'s> Way<'s> {
+    fn new(system: &'s System, q: &'s DVector<f64>, v: &'s DVector<f64>) -> Self {
+        Self {
+            system,
+            q,
+            v,
+            start: OnceCell::new(),
+            end: OnceCell::new(),
+        }
+    }
+
     /// Poses and spatial twists after the time `t`.
     fn at(&self, t: f64) -> (Vec<Pose>, Vec<Vec6>) {
         let tree = &self.system.tree;
@@ -58,7 +73,7 @@ impl Way<'_> {
     fn meeting(
         &self,
         model: &ContactModel,
-        k: usize,
+        k: &ContactPair,
         horizon: f64,
         target: f64,
     ) -> Result<Option<Meeting>> {
@@ -66,14 +81,18 @@ impl Way<'_> {
         let near = target + MET * shapes.halfway(k);
         let mut time = 0.0;
         for _ in 0..ADVANCES {
-            let (poses, twists) = self.at(time);
-            let closing = ROOM * shapes.closing(k, &poses, &twists);
+            let there = match time == 0.0 {
+                true => Cow::Borrowed(self.start.get_or_init(|| self.at(0.0))),
+                false => Cow::Owned(self.at(time)),
+            };
+            let (poses, twists) = &*there;
+            let closing = ROOM * shapes.closing(k, poses, twists);
             let reach = near + closing * (horizon - time);
             // Of speeds out of range nothing is foreseen: the stage refuses them.
             if !reach.is_finite() {
                 return Ok(None);
             }
-            let mut points = shapes.points_within(k, &poses, reach)?;
+            let mut points = shapes.points_within(k, poses, reach)?;
             points.retain(|p| p.weight >= FULL);
             let gap = points.iter().map(|p| p.gap).fold(f64::INFINITY, f64::min);
             if gap == f64::INFINITY {
@@ -82,7 +101,7 @@ impl Way<'_> {
             if gap <= near {
                 let met = points.iter().filter(|p| p.gap <= near);
                 let speed = met.map(|p| {
-                    let twist = relative(shapes, k, &twists);
+                    let twist = relative(k, twists);
                     -p.normal.dot(&point_velocity(&twist, &p.position))
                 });
                 let speed = speed.fold(0.0, f64::max);
@@ -104,19 +123,29 @@ impl Way<'_> {
 }
 
 /// Whether next to nothing is left of the water between a pair after the time `t`; where there was as little before, but some still is, it is pressed there.
-fn closed(way: &Way, model: &ContactModel, k: usize, t: f64) -> bool {
-    let least = LEFT * model.laws[k].gap;
-    let under = |t: f64, gap: f64| {
-        let points = model.shapes.points_within(k, &way.at(t).0, gap);
+fn closed(way: &Way, model: &ContactModel, k: &ContactPair, t: f64) -> bool {
+    let least = LEFT * model.laws.of(k).gap;
+    let under = |poses: &[Pose], gap: f64| {
+        let points = model.shapes.points_within(k, poses, gap);
         points.is_ok_and(|points| points.iter().any(|p| p.weight >= FULL))
     };
-    under(t, least) && (under(t, 0.0) || !under(0.0, least))
+    let end = &way.end.get_or_init(|| way.at(t)).0;
+    under(end, least)
+        && (under(end, 0.0) || !under(&way.start.get_or_init(|| way.at(0.0)).0, least))
 }
 
-fn relative(shapes: &Contacts, k: usize, twists: &[Vec6]) -> Vec6 {
-    let pair = &shapes.pairs()[k];
+fn relative(pair: &ContactPair, twists: &[Vec6]) -> Vec6 {
     let second = pair.second_body();
     twists[pair.first] - second.map_or(Vec6::zeros(), |b| twists[b])
+}
+
+/// The pairs that may meet within the time `dt` of bodies at these poses that move with these twists, those that are near beforehand, and some others.
+fn met_within(model: &ContactModel, poses: &[Pose], twists: &[Vec6], dt: f64) -> Vec<ContactPair> {
+    let shapes = &model.shapes;
+    model.near(poses, |b| {
+        let way = ROOM * dt * shapes.share_closing(b, &poses[b], &twists[b]);
+        way + shapes.share_ahead(b) + MET * shapes.share_halfway(b)
+    })
 }
 
 /// A number of pieces in which each does `share` at most of what a step does.
@@ -131,10 +160,10 @@ impl Stepper<'_> {
         let mut plan = Plan::whole();
         let (system, dt) = (self.system, self.dt);
         if let Some(model) = &system.contact {
-            let way = Way { system, q: &e.q, v };
+            let way = Way::new(system, &e.q, v);
             let twists = system.tree.twists(&e.kinematics, v);
-            for (k, law) in model.laws.iter().enumerate() {
-                let shapes = &model.shapes;
+            for k in &met_within(model, &e.kinematics.poses, &twists, dt) {
+                let (shapes, law) = (&model.shapes, model.laws.of(k));
                 let halfway = shapes.halfway(k);
                 if shapes.closing(k, &e.kinematics.poses, &twists) * dt <= halfway {
                     continue;
@@ -143,7 +172,7 @@ impl Stepper<'_> {
                 let wanted = met.map_or(1, |m| pieces(m.speed * dt / halfway));
                 plan.pieces = plan.pieces.max(wanted);
                 if wanted > 1 && model.rigid {
-                    plan.sharp.pairs.push(k);
+                    plan.sharp.pairs.push(*k);
                 }
             }
         }
@@ -174,24 +203,29 @@ impl Stepper<'_> {
             return Ok(None);
         };
         let twists = system.tree.twists(kinematics, v);
-        let mut travels = Vec::with_capacity(model.laws.len());
-        for (k, law) in model.laws.iter().enumerate() {
+        let poses = &kinematics.poses;
+        let horizon = model.laws.common.horizon;
+        // Bodies that don't come farther than one always looks are seen as ever.
+        let near = met_within(model, poses, &twists, horizon);
+        let way = Way::new(system, q, v);
+        let mut travels = Vec::with_capacity(near.len());
+        for k in &near {
+            let law = model.laws.of(k);
             let horizon = law.horizon / plan.of_pair(k) as f64;
-            let closing = model.shapes.closing(k, &kinematics.poses, &twists);
+            let closing = model.shapes.closing(k, poses, &twists);
             let travel = ROOM * closing * horizon;
-            let way = Way { system, q, v };
             let far = closing * horizon > model.shapes.ahead(k)
                 && (way.meeting(model, k, horizon, law.gap + law.width)?).is_some();
             travels.push(if far { travel } else { 0.0 });
         }
-        let as_ever = |k: usize| travels[k] == 0.0 && plan.of_pair(k) == 1;
-        if (0..travels.len()).all(as_ever) {
+        let sharp = plan.pieces > 1 && !plan.sharp.pairs.is_empty();
+        if !sharp && travels.iter().all(|travel| *travel == 0.0) {
             return Ok(None);
         }
         let mut out = Vec::new();
-        for (k, travel) in travels.iter().enumerate() {
-            let (poses, n) = (&kinematics.poses, plan.of_pair(k));
-            out.extend(system.pair_points(self.parameters, poses, k, n, *travel)?);
+        for (k, travel) in near.iter().zip(travels) {
+            let n = plan.of_pair(k);
+            out.extend(system.pair_points(self.parameters, poses, k, n, travel)?);
         }
         Ok(Some(out))
     }
@@ -224,12 +258,19 @@ impl Stepper<'_> {
         let mut out = Stops::default();
         let (system, dt) = (self.system, self.dt);
         if let Some(model) = system.contact.as_ref().filter(|m| m.rigid) {
-            let way = Way { system, q: &e.q, v };
+            let way = Way::new(system, &e.q, v);
             let twists = system.tree.twists(&e.kinematics, v);
-            for k in 0..model.laws.len() {
+            let mut near = met_within(model, &e.kinematics.poses, &twists, dt);
+            if model.wet {
+                let end = &way.end.get_or_init(|| way.at(dt)).0;
+                near.extend(model.near(end, |_| 0.0));
+                near.sort_unstable();
+                near.dedup();
+            }
+            for k in &near {
                 let shapes = &model.shapes;
                 if model.wet && closed(&way, model, k, dt) {
-                    out.pairs.push(k);
+                    out.pairs.push(*k);
                     continue;
                 }
                 let deep = DEEP * shapes.halfway(k);
@@ -244,7 +285,7 @@ impl Stepper<'_> {
                 }
                 // Where no distance is found bodies are deep in one another.
                 if !matches!(way.meeting(model, k, dt, -deep), Ok(None)) {
-                    out.pairs.push(k);
+                    out.pairs.push(*k);
                 }
             }
         }

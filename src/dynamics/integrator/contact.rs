@@ -10,13 +10,13 @@
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
-use super::split::{Split, share};
+use super::hessian::{Hessian, Places};
+use super::split::share;
 use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
-use crate::adjoint::solve::Definite;
+use crate::dynamics::Dual;
 use crate::dynamics::slopes::columns;
-use crate::dynamics::{Dual, Evaluation};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -38,19 +38,6 @@ struct Trial {
     residual: f64,
 }
 
-/// The Hessian M + Δt Jᵀ G J on the free rows, factored.
-fn hessian(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Result<Definite> {
-    let m = e.mass_matrix() - dt * e.contact_jacobian(v);
-    let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
-    Definite::new(split.block(&m)).ok_or_else(|| Error::Solver {
-        what: "contact".into(),
-        iterations: 0,
-        residual: f64::INFINITY,
-        tolerance: 0.0,
-        remedy: "the mass matrix isn't positive definite, or the stiffness is out of range".into(),
-    })
-}
-
 /// The velocity after contact, from the one before it; the same bits where nothing presses.
 pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>> {
     let (e, split, dt) = (start.near, start.split, start.stepper.dt);
@@ -58,12 +45,12 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     if split.free.is_empty() || !e.contact_acts(before) {
         return Ok(before.clone());
     }
-    let sized = split.sizes(e.mass_matrix());
-    let summands = e.mass_matrix().abs();
-    let least = sized(&(&summands * before.abs()));
+    let sized = split.sizes(&e.mass_blocks().diagonal());
+    let summands = e.mass_blocks().mapped(DMatrix::abs);
+    let least = sized(&summands.times(&before.abs()));
     let at = |v: DVector<f64>| {
         let imbalance = e.mass_times(&(&v - before)) - dt * e.contact_force(&v, Dual::User);
-        let size = sized(&(&summands * v.abs())).max(least);
+        let size = sized(&summands.times(&v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
         let residual = share(sized(&imbalance), size);
         Trial {
@@ -73,7 +60,7 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
         }
     };
     let mut now = at(before.clone());
-    let mut previous = f64::INFINITY;
+    let (mut previous, mut places) = (f64::INFINITY, Places::default());
     for iteration in 0..ITERATIONS {
         let stalled = now.residual >= 0.25 * previous;
         let converged = now.residual == 0.0 || (now.residual <= RESIDUAL && stalled);
@@ -84,7 +71,8 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
             break;
         }
         previous = now.residual;
-        let step = hessian(e, split, &now.v, dt)?.solve(&split.take(&now.imbalance));
+        let hessian = Hessian::new(e, split, &now.v, dt, &mut places)?;
+        let step = hessian.solve(&split.take(&now.imbalance));
         let step = split.put(&step);
         now = search(now, &step, &at);
     }
@@ -165,7 +153,7 @@ enum Acting {
     /// Something does, but every velocity is driven.
     Driven,
     /// The problem's Hessian at its solution, factored.
-    Solved(Definite),
+    Solved(Hessian),
 }
 
 impl<'s> Adjoint<'s> {
@@ -177,7 +165,8 @@ impl<'s> Adjoint<'s> {
         } else if split.free.is_empty() {
             Acting::Driven
         } else {
-            Acting::Solved(hessian(e, split, &velocities.after, start.stepper.dt)?)
+            let (after, dt) = (&velocities.after, start.stepper.dt);
+            Acting::Solved(Hessian::new(e, split, after, dt, &mut Places::default())?)
         };
         Ok(Self { velocities, acting })
     }
@@ -261,7 +250,7 @@ impl<'s> Adjoint<'s> {
         };
         let (e, near, split) = (start.e, start.near, start.split);
         let ContactVelocities { before, after } = self.velocities;
-        let w = split.put(&hessian.solve_vjp(&split.take(after_bar)));
+        let w = split.put(&hessian.solve(&split.take(after_bar)));
         bar.add(
             start.stepper.dt,
             &near.contact_force_vjp(after, &w, Dual::User),

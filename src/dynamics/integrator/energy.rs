@@ -51,7 +51,7 @@ fn closes(start: &Start) -> bool {
     let still = &split.driven - drift.velocity();
     let mut driven = split.is_driven.iter().zip(still.iter());
     drift.is_whole()
-        && s.system.symmetric.ncols() < split.free.len()
+        && s.system.symmetric.len() < split.free.len()
         && !split.moved.contains(&true)
         && driven.all(|(driven, v)| !driven || *v == 0.0)
         && s.split_at(start.state).is_driven == split.is_driven
@@ -114,8 +114,8 @@ impl Parts {
         let basis = &s.system.symmetric;
         let (mut together, mut common, mut direction) =
             (DVector::zeros(v.len()), None, hat.clone());
-        if basis.ncols() > 0 {
-            let user = columns(basis, |b| end.frame_velocity_inverse(b));
+        if !basis.is_empty() {
+            let user = columns(&basis.dense(), |b| end.frame_velocity_inverse(b));
             let momenta = columns(&user, |v| end.mass_times(v));
             let matrix = user.tr_mul(&momenta);
             let matrix = Definite::new(0.5 * (&matrix + matrix.transpose())).ok_or_else(|| {
@@ -310,7 +310,7 @@ impl<'a> Closure<'a> {
             let basis = &s.system.symmetric;
             let moved = end.frame_dual(&end.mass_times(&across));
             let eta = common.solve(&basis.tr_mul(&moved));
-            let carried = basis * eta;
+            let carried = basis.mul(&eta);
             hat_star_bar -= &carried;
             across -= end.frame_velocity_inverse(&carried);
             self.inertia_vjp(-1.0, &across, &parts.together, &mut at_end)?;

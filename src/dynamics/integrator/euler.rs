@@ -20,7 +20,8 @@ use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
-use crate::adjoint::solve::{Definite, General};
+use crate::adjoint::solve::Definite;
+use crate::dynamics::island_matrix::{IslandFactor, IslandMatrix};
 use crate::dynamics::slopes::columns;
 use crate::dynamics::{Drift, Linearisation};
 use crate::{Error, Result};
@@ -85,52 +86,59 @@ impl Rule {
     }
 }
 
-/// Matrix of the stage on the free rows, from ∂f/∂v and the momentum p̂ + h f.
+/// Matrix of the stage, from ∂f/∂v and the momentum p̂ + h f.
 fn stage_matrix(
     e: &Linearisation,
-    split: &Split,
     v: &DVector<f64>,
-    rates: &DMatrix<f64>,
+    rates: &IslandMatrix,
     reached: &DVector<f64>,
     rule: Rule,
-) -> DMatrix<f64> {
+) -> IslandMatrix {
     let tree = &e.system.tree;
     let xi = rule.reach * v;
     let [_, by_xi, by_hat] = tree.chart_momentum_slopes(&e.q, &xi, reached);
-    let impulses = columns(rates, |rate| rule.impulse(e, rate));
-    let mut m = e.mass_matrix() - tree.blocks_times(&by_hat, &impulses);
+    let impulses = rates.mapped(|rates| columns(rates, |rate| rule.impulse(e, rate)));
+    let mut m = (e.mass_blocks()).minus(&impulses.mapped(|impulses| by_hat.times(impulses)));
     if rule.reach != 0.0 {
-        m -= rule.reach * by_xi;
+        m.subtract(by_xi.entries().map(|(i, j, x)| (i, j, rule.reach * x)));
     }
-    split.block(&m)
+    m
 }
 
 /// How many times too long a step is for its implicit stage; none where it isn't.
 ///
 /// With W = h ∂f/∂v on the free rows, the stage's matrix is M − W but for what turning adds, and κ the largest eigenvalue of
 /// M^-½ ½(W + Wᵀ) M^-½: the part by which the inertia M changes in the time h of what moves relative to the water, less what damps. In one coordinate it is
-/// h v M′/M, and there is no solution from κ = ½ on. Up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations.
+/// h v M′/M, and there is no solution from κ = ½ on. Up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations of each island.
 fn excess(
     e: &Linearisation,
     split: &Split,
     v: &DVector<f64>,
-    rates: &DMatrix<f64>,
+    rates: &IslandMatrix,
     rule: Rule,
 ) -> Option<usize> {
-    if rates.iter().all(|x| *x == 0.0) {
+    if rates.is_zero() {
         return None;
     }
     let xi = rule.reach * v;
     let (tree, drift) = (&e.system.tree, &e.system.drift);
     let [_, _, by_hat] = tree.chart_momentum_slopes(&e.q, &xi, &DVector::zeros(v.len()));
-    let mut grown = columns(rates, |rate| rule.impulse(e, rate));
+    let mut grown = rates.mapped(|rates| columns(rates, |rate| rule.impulse(e, rate)));
+    let inertia = e.mass_blocks();
     if !drift.is_none() {
-        grown -= columns(e.mass_matrix(), |m| rule.h * drift.turn(&e.frame_dual(m)));
+        let turned = |m: &DVector<f64>| rule.h * drift.turn(&e.frame_dual(m));
+        grown = grown.minus(&inertia.mapped(|m| columns(m, turned)));
     }
-    let grown = tree.blocks_times(&by_hat, &grown);
-    let grown = split.block(&grown);
+    let grown = grown.mapped(|grown| by_hat.times(grown));
+    let blocks = grown.free_blocks(&split.free);
+    let blocks = blocks.zip(inertia.free_blocks(&split.free));
+    let each = blocks.filter_map(|((_, grown), (_, m))| own_excess(grown, m));
+    each.max()
+}
+
+/// The same of the velocities of an island.
+fn own_excess(grown: DMatrix<f64>, m: DMatrix<f64>) -> Option<usize> {
     let grown = 0.5 * (&grown + grown.transpose());
-    let m = split.block(e.mass_matrix());
     if grown.is_empty() || Definite::new(CHANGE * &m - &grown).is_some() {
         return None;
     }
@@ -153,7 +161,7 @@ pub(super) struct Equation<'s, 'a> {
     hat: &'s DVector<f64>,
     rule: Rule,
     /// Σ |M| |v| is what the sum M v is measured by, so that a total momentum of zero is no target for relative errors.
-    summands: DMatrix<f64>,
+    summands: IslandMatrix,
     /// By which momenta are weighed, and the least size of what is balanced.
     scale: DVector<f64>,
     least: f64,
@@ -171,8 +179,8 @@ impl<'s, 'a> Equation<'s, 'a> {
             e,
             hat,
             rule,
-            summands: e.mass_matrix().abs(),
-            scale: start.split.scale(e.mass_matrix()),
+            summands: e.mass_blocks().mapped(DMatrix::abs),
+            scale: start.split.scale(&e.mass_blocks().diagonal()),
             least: 0.0,
         };
         let rest = out.sized(&e.rest_momentum);
@@ -192,7 +200,7 @@ impl<'s, 'a> Equation<'s, 'a> {
         let xi = rule.reach * &v;
         let target = e.system.tree.chart_momentum(&e.q, &xi, &reached);
         let defect = e.momentum(&v) - &target;
-        let size = self.sized(&(&self.summands * v.abs()));
+        let size = self.sized(&self.summands.times(&v.abs()));
         let size = size.max(self.sized(&target)).max(self.least);
         let merit = self.sized(&defect);
         let residual = share(merit, size);
@@ -207,22 +215,21 @@ impl<'s, 'a> Equation<'s, 'a> {
     }
 
     /// The factor of its matrix at a trial.
-    fn factor(&self, now: &Trial, rates: &DMatrix<f64>) -> General {
+    fn factor(&self, now: &Trial, rates: &IslandMatrix) -> IslandFactor {
         let Trial { v, reached, .. } = now;
-        General::new(stage_matrix(
-            self.e,
-            self.start.split,
-            v,
-            rates,
-            reached,
-            self.rule,
-        ))
+        let matrix = stage_matrix(self.e, v, rates, reached, self.rule);
+        matrix.factored(&self.start.split.free, false)
+    }
+
+    /// What momenta are weighed by in turn: the inertia of the free velocities, each by itself.
+    pub fn weight(&self) -> DVector<f64> {
+        self.start.split.take(&self.e.mass_blocks().diagonal())
     }
 
     /// The same at the first trial of a step, if the step isn't too long.
-    pub fn first_factor(&self, now: &Trial) -> std::result::Result<General, Halt> {
+    pub fn first_factor(&self, now: &Trial) -> std::result::Result<IslandFactor, Halt> {
         let (e, start) = (self.e, &self.start);
-        let rates = e.force_velocity_jacobian(&now.v, &start.input.control)?;
+        let rates = e.force_velocity_blocks(&now.v, &start.input.control)?;
         if start.plan.may_cut()
             && let Some(times) = excess(e, start.split, &now.v, &rates, self.rule)
         {
@@ -260,12 +267,12 @@ pub(super) fn solve_stage<'a>(
         let factor = if iteration == 0 {
             let factor = equation.first_factor(&now)?;
             let at = |v| equation.at(v);
-            if let Some(found) = quasi::descend(split, e.mass_matrix(), &factor, &now, 0.0, at) {
+            if let Some(found) = quasi::descend(split, &equation.weight(), &factor, &now, 0.0, at) {
                 return Ok(found.into());
             }
             factor
         } else {
-            equation.factor(&now, &e.force_velocity_jacobian(&now.v, control)?)
+            equation.factor(&now, &e.force_velocity_blocks(&now.v, control)?)
         };
         let Some(step) = factor.solve(&split.take(&now.defect)) else {
             break;
@@ -371,7 +378,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let [by_q, _, by_hat] = tree.chart_momentum_slopes(&e.q, &(s.dt * before), &self.reached);
         // p̂ + Δt f at a given velocity; the stage's matrix holds what the velocity does.
         let held = start.momentum_jvp(along)? + s.dt * force.along(q, None, inputs);
-        let right = by_q * q + by_hat * &held - momentum.along(q, None, inputs);
+        let right = by_q.dense() * q + by_hat.dense() * &held - momentum.along(q, None, inputs);
         let v = self.stage.solve_jvp(split, &right)?;
         let hat = held + s.dt * (force.v * &v);
         let (mut next, after) = self.contact.apply_jvp(start, along, &v, hat)?;
@@ -398,7 +405,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
             }
         };
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
-        v_bar += s.dt * self.stage.rates.tr_mul(&z);
+        v_bar += s.dt * self.stage.rates.tr_times(&z);
         let w = self.stage.solve(split, &v_bar)?;
         let tree = &e.system.tree;
         let [q_bar, _, hat_bar] =
@@ -415,11 +422,11 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
 /// What the derivatives of a stage need.
 pub(super) struct AdjointStage {
     /// ∂f/∂v.
-    pub rates: DMatrix<f64>,
+    pub rates: IslandMatrix,
     /// The stage matrix.
-    pub matrix: DMatrix<f64>,
+    pub matrix: IslandMatrix,
     /// Factor of the transposed stage matrix.
-    factor: General,
+    factor: IslandFactor,
 }
 
 impl AdjointStage {
@@ -431,9 +438,9 @@ impl AdjointStage {
         reached: &DVector<f64>,
         rule: Rule,
     ) -> Result<Self> {
-        let rates = e.force_velocity_jacobian(v, &start.input.control)?;
-        let matrix = stage_matrix(e, start.split, v, &rates, reached, rule);
-        let factor = General::new(matrix.transpose());
+        let rates = e.force_velocity_blocks(v, &start.input.control)?;
+        let matrix = stage_matrix(e, v, &rates, reached, rule);
+        let factor = matrix.factored(&start.split.free, true);
         Ok(Self {
             rates,
             matrix,
@@ -443,7 +450,7 @@ impl AdjointStage {
 
     /// dv, zero on driven entries, with stage matrix · dv_f = right_f: the factor is of all columns.
     fn solve_jvp(&self, split: &Split, right: &DMatrix<f64>) -> Result<DMatrix<f64>> {
-        solve_columns(self.matrix.clone(), split, right)
+        solve_columns(&self.matrix, split, right)
     }
 
     /// w_f with (stage matrix)ᵀ w_f = v̄_f, zero on driven entries.
@@ -458,14 +465,15 @@ impl AdjointStage {
 
 /// Columns dv, zero on driven rows, with `matrix` · dv_f = right_f.
 pub(super) fn solve_columns(
-    matrix: DMatrix<f64>,
+    matrix: &IslandMatrix,
     split: &Split,
     right: &DMatrix<f64>,
 ) -> Result<DMatrix<f64>> {
     if split.free.is_empty() {
         return Ok(DMatrix::zeros(right.nrows(), right.ncols()));
     }
-    let solution = General::new(matrix).solve_columns(&split.take_rows(right));
+    let factor = matrix.factored(&split.free, false);
+    let solution = factor.solve_columns(&split.take_rows(right));
     Ok(split.put_rows(&solution.ok_or_else(|| singular("tangent"))?))
 }
 

@@ -22,6 +22,7 @@ use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::dynamics::Linearisation;
+use crate::dynamics::island_matrix::IslandMatrix;
 use crate::dynamics::slopes::columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -54,7 +55,7 @@ fn noise(e: &Linearisation) -> f64 {
 
 /// Relative change between two velocities, each joint coordinate weighed by its inertia.
 fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
-    let weight = e.mass_matrix().diagonal().map(|m| m.max(0.0).sqrt());
+    let weight = e.mass_blocks().diagonal().map(|m| m.max(0.0).sqrt());
     let size = b.component_mul(&weight).norm();
     let step = (a - b).component_mul(&weight).norm();
     if step == 0.0 { 0.0 } else { step / size }
@@ -112,15 +113,9 @@ fn at_once(
         let m = middle(start, &v)?;
         Equation::new(start, &m, p, rule).at(v)
     };
-    let mass_matrix = m.mass_matrix();
-    Ok(quasi::descend(
-        split,
-        mass_matrix,
-        &factor,
-        &first,
-        noise(&m),
-        at,
-    ))
+    let weight = equation.weight();
+    let found = quasi::descend(split, &weight, &factor, &first, noise(&m), at);
+    Ok(found)
 }
 
 /// What the derivatives of a step need.
@@ -175,12 +170,12 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         // Derivative of Xᵀ(p̂ + h f) − M v − p_rest over q_m, which moves with v as well.
         let bent =
             frame.tr_mul(&impulse(&force.q)) + m.frame_momentum_slope(&self.reached) - &momentum.q;
-        let matrix = &self.stage.matrix - split.block(&(bent * &by_v));
+        let matrix = IslandMatrix::whole(self.stage.matrix.dense() - bent * &by_v);
         let p = start.momentum_jvp(along)?;
         let held = &p + impulse(&force.along(&middle, None, inputs));
         let right = frame.tr_mul(&held) + m.frame_momentum_slope(&self.reached) * &middle
             - momentum.along(&middle, None, inputs);
-        let v = solve_columns(matrix, split, &right)?;
+        let v = solve_columns(&matrix, split, &right)?;
         let middle = middle + by_v * &v;
         let hat = p + s.dt * force.along(&middle, Some(&v), inputs);
         Ok(self.contact.apply_jvp(start, along, &v, hat)?.0)
@@ -192,7 +187,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let h = 0.5 * s.dt;
         let mut bar = StepBar::zeros(start.e);
         let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, None, &mut bar)?;
-        let v_bar_force = s.dt * self.stage.rates.tr_mul(&z);
+        let v_bar_force = s.dt * self.stage.rates.tr_times(&z);
         let fixed = v_bar_next + v_bar_force;
         // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
         let mut v_bar = fixed.clone();

@@ -18,6 +18,7 @@ mod ahead;
 mod contact;
 mod energy;
 mod euler;
+mod hessian;
 mod midpoint;
 mod pieces;
 mod plan;

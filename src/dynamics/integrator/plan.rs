@@ -1,15 +1,16 @@
 //! Into how many pieces a step is cut, and why one was given up.
 
 use crate::Error;
+use crate::contact::ContactPair;
 
 /// Most pieces of a step.
 pub(super) const MOST: usize = 64;
 
-/// Pairs of surfaces and limits of joints, by their numbers.
+/// Pairs of surfaces, and limits of joints by their numbers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Stops {
     /// Of [`Contacts::pairs`](crate::contact::Contacts::pairs), ascending.
-    pub pairs: Vec<usize>,
+    pub pairs: Vec<ContactPair>,
     /// Of [`System::limits`](crate::dynamics::System::limits), ascending.
     pub limits: Vec<usize>,
 }
@@ -22,15 +23,16 @@ impl Stops {
 
     /// Adds others.
     pub(super) fn add(&mut self, other: &Self) {
-        for (to, from) in [
-            (&mut self.pairs, &other.pairs),
-            (&mut self.limits, &other.limits),
-        ] {
-            to.extend(from);
-            to.sort_unstable();
-            to.dedup();
-        }
+        add(&mut self.pairs, &other.pairs);
+        add(&mut self.limits, &other.limits);
     }
+}
+
+/// Adds others, ascending.
+fn add<T: Copy + Ord>(to: &mut Vec<T>, from: &[T]) {
+    to.extend(from);
+    to.sort_unstable();
+    to.dedup();
 }
 
 /// How a step is cut.
@@ -62,17 +64,17 @@ impl Plan {
     }
 
     /// How much sharper the law of a pair of surfaces is than in the whole step.
-    pub fn of_pair(&self, pair: usize) -> usize {
+    pub fn of_pair(&self, pair: &ContactPair) -> usize {
         self.of(&self.sharp.pairs, pair)
     }
 
     /// The same of a joint's limit.
     pub fn of_limit(&self, limit: usize) -> usize {
-        self.of(&self.sharp.limits, limit)
+        self.of(&self.sharp.limits, &limit)
     }
 
-    fn of(&self, sharp: &[usize], number: usize) -> usize {
-        match sharp.binary_search(&number) {
+    fn of<T: Ord>(&self, sharp: &[T], which: &T) -> usize {
+        match sharp.binary_search(which) {
             Ok(_) => self.pieces,
             Err(_) => 1,
         }

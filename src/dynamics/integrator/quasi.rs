@@ -5,8 +5,8 @@
 //! C. T. Kelley, "Solving Nonlinear Equations with Newton's Method", 2003, chapter 4.
 
 use super::split::Split;
-use crate::adjoint::solve::General;
-use nalgebra::{DMatrix, DVector};
+use crate::dynamics::island_matrix::IslandFactor;
+use nalgebra::DVector;
 
 /// Most steps.
 const STEPS: usize = 12;
@@ -37,12 +37,12 @@ impl Trial {
     }
 }
 
-/// The solution from `first` on, `factor` being that of the stage's matrix about there; none where each step doesn't come much nearer, but for residuals under `noise`, of which
+/// The solution from `first` on, `factor` being that of the stage's matrix about there, and `weight` the inertia of each free velocity; none where each step doesn't come much nearer, but for residuals under `noise`, of which
 /// nothing more can be told.
 pub(super) fn descend(
     split: &Split,
-    mass_matrix: &DMatrix<f64>,
-    factor: &General,
+    weight: &DVector<f64>,
+    factor: &IslandFactor,
     first: &Trial,
     noise: f64,
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,
@@ -50,7 +50,6 @@ pub(super) fn descend(
     // Steps made, each with its dual by the inertia.
     let mut made: Vec<[DVector<f64>; 2]> = Vec::new();
     let mut improved: Vec<DVector<f64>> = Vec::new();
-    let weight = split.block(mass_matrix).diagonal();
     let mut back = factor.solve(&split.take(&first.defect))?;
     let (mut v, mut previous) = (first.v.clone(), first.residual);
     for _ in 0..STEPS {
@@ -64,7 +63,7 @@ pub(super) fn descend(
         if !nearer {
             return None;
         }
-        let dual = step.component_mul(&weight);
+        let dual = step.component_mul(weight);
         back = factor.solve(&split.take(&now.defect))?;
         for ([_, dual], u) in made.iter().zip(&improved) {
             let part = dual.dot(&back);

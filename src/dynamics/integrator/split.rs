@@ -78,15 +78,15 @@ impl Split {
         out
     }
 
-    /// Sizes of free momenta, each weighed by the square root of its inertia.
-    pub fn sizes(&self, mass_matrix: &DMatrix<f64>) -> impl Fn(&DVector<f64>) -> f64 {
-        let scale = self.scale(mass_matrix);
+    /// Sizes of free momenta, each weighed by the square root of its inertia, from the diagonal of the mass matrix.
+    pub fn sizes<'s>(&'s self, inertia: &DVector<f64>) -> impl Fn(&DVector<f64>) -> f64 + use<'s> {
+        let scale = self.scale(inertia);
         move |p| self.take(p).component_mul(&scale).norm()
     }
 
     /// Those weights.
-    pub fn scale(&self, mass_matrix: &DMatrix<f64>) -> DVector<f64> {
-        let inertia = self.free.iter().map(|&i| mass_matrix[(i, i)]);
+    pub fn scale(&self, inertia: &DVector<f64>) -> DVector<f64> {
+        let inertia = self.free.iter().map(|&i| inertia[i]);
         let scale = inertia.map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());
         DVector::from_iterator(self.free.len(), scale)
     }

@@ -10,18 +10,18 @@
 //! crossing edges.
 
 mod film;
+mod nearest;
 mod pair;
 
 use crate::error::{Error, Result};
 use crate::geometry::convex::Solid;
 use crate::geometry::mesh::TriMesh;
-use crate::geometry::points::Ball;
+use crate::geometry::pairing::Pairing;
 use crate::geometry::tree::MeshTree;
 use crate::geometry::wall::{HalfSpace, Wall};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use pair::{Between, Pair};
-use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::sync::Arc;
 
 /// Smallest distance between two surfaces, or a surface and a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +75,7 @@ pub struct Distance {
 }
 
 /// What a body is near.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Other {
     /// Another body, by its number.
     Body(usize),
@@ -86,11 +86,13 @@ pub enum Other {
 /// The surfaces and walls of a scene, ready to be asked for gaps.
 #[derive(Clone, Debug)]
 pub struct Gaps {
-    trees: Vec<Option<MeshTree>>,
+    trees: Vec<Option<Arc<MeshTree>>>,
     /// What the meshes stand for, of bodies by formula.
     solids: Vec<Option<Solid>>,
     walls: Vec<HalfSpace>,
-    pairs: Vec<(usize, Other)>,
+    pairing: Pairing,
+    /// No edge of a mesh is longer in the mean around a corner, m.
+    longest: f64,
 }
 
 impl Gaps {
@@ -112,25 +114,27 @@ impl Gaps {
                 format!("bodies are counted from 0 and there are {count}"),
             ));
         }
-        let tree = |mesh: &Option<&TriMesh>| mesh.map(MeshTree::new);
-        let trees: Vec<Option<MeshTree>> = meshes.iter().map(tree).collect();
-        let walls = Wall::half_spaces(walls)?;
-        let ignored: BTreeSet<(usize, usize)> =
-            ignore.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
-        let submerged: Vec<usize> = (0..count).filter(|&i| trees[i].is_some()).collect();
-        let mut pairs = Vec::new();
-        for (k, &i) in submerged.iter().enumerate() {
-            let others = submerged[k + 1..]
-                .iter()
-                .filter(|&&j| !ignored.contains(&(i, j)));
-            pairs.extend(others.map(|&j| (i, Other::Body(j))));
-            pairs.extend((0..walls.len()).map(|w| (i, Other::Wall(w))));
-        }
+        let tree = |mesh: &Option<&TriMesh>| Some(Arc::new(MeshTree::new((*mesh)?)));
+        let trees: Vec<_> = meshes.iter().map(tree).collect();
+        let longest = trees.iter().flatten().map(|t| t.longest_edge());
         Ok(Self {
+            longest: longest.fold(0.0, f64::max),
             solids: vec![None; count],
             trees,
-            walls,
-            pairs,
+            walls: Wall::half_spaces(walls)?,
+            pairing: Pairing::all(count).but(ignore.iter().copied()),
+        })
+    }
+
+    /// The same surfaces with other walls, and others of them looked at together.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a wall has no normal.
+    pub(crate) fn paired(&self, walls: &[Wall], pairing: Pairing) -> Result<Self> {
+        Ok(Self {
+            walls: Wall::half_spaces(walls)?,
+            pairing,
+            ..self.clone()
         })
     }
 
@@ -151,65 +155,38 @@ impl Gaps {
         Ok(self)
     }
 
-    /// The pairs that are looked at: a body, and another or a wall.
-    pub fn pairs(&self) -> &[(usize, Other)] {
-        &self.pairs
+    /// The pairs that are looked at: a body, and another or a wall. Bodies in order, for each the later bodies and then the walls.
+    pub fn pairs(&self) -> impl Iterator<Item = (usize, Other)> {
+        let submerged = || (0..self.trees.len()).filter(|i| self.trees[*i].is_some());
+        submerged().flat_map(move |i| {
+            let bodies = submerged().skip_while(move |j| *j <= i);
+            let bodies = bodies.filter(move |j| self.pairing.has(i, *j));
+            let walls = (0..self.walls.len()).map(Other::Wall);
+            bodies.map(Other::Body).chain(walls).map(move |o| (i, o))
+        })
     }
 
-    /// Smallest gap of all pairs, one pose per mesh; none when there is no pair. Of pairs
-    /// equally near to rounding, always the same one. Pairs with a pose that is missing or isn't
-    /// finite are passed over.
-    pub fn smallest(&self, poses: &[Pose]) -> Option<Gap> {
-        let placed = |(i, pose): (usize, &Pose)| {
-            let tree = self.trees.get(i)?.as_ref()?;
-            // Meshes lie within the shapes that they stand for.
-            let ball = self.solids[i].as_ref().map_or(tree.ball, Solid::ball);
-            Some(ball.transformed(pose))
-        };
-        let balls: Vec<Option<Ball>> = poses.iter().enumerate().map(placed).collect();
-        // Nearest first by the balls around them. Bits of numbers ≥ 0 sort as the numbers do.
-        let mut waiting: BinaryHeap<Reverse<(u64, usize)>> = self
-            .pairs
-            .iter()
-            .enumerate()
-            .filter_map(|(k, &pair)| {
-                let bound = self.bound(&balls, pair)?;
-                Some(Reverse((bound.max(0.0).to_bits(), k)))
-            })
-            .collect();
-        let mut best: Option<Gap> = None;
-        while let Some(Reverse((bits, k))) = waiting.pop() {
-            let bound = f64::from_bits(bits);
-            let limit = best.map_or(f64::INFINITY, |gap| gap.distance);
-            if bound > 0.0 && bound >= limit {
-                break;
-            }
-            if let Some(gap) = self.gap(self.pairs[k], poses, limit) {
-                best = Some(gap);
-            }
-        }
-        best
+    /// [`Gap::edge`] is no more than this, m.
+    pub(crate) fn longest_edge(&self) -> f64 {
+        self.longest
+    }
+
+    /// Which bodies are looked at together.
+    pub(crate) fn pairing(&self) -> &Pairing {
+        &self.pairing
     }
 
     /// Every pair's gap: bodies in order, for each the later bodies and then the walls. Pairs
     /// with a pose that is missing or isn't finite are passed over.
     pub fn all(&self, poses: &[Pose]) -> Vec<Gap> {
-        self.pairs
-            .iter()
-            .filter_map(|&pair| self.gap(pair, poses, f64::INFINITY))
+        self.pairs()
+            .filter_map(|pair| self.gap(pair, poses, f64::INFINITY))
             .collect()
     }
 
-    /// A lower bound of a gap that isn't negative, from balls around the bodies.
-    fn bound(&self, balls: &[Option<Ball>], (i, other): (usize, Other)) -> Option<f64> {
-        let ball = (*balls.get(i)?)?;
-        let bound = match other {
-            Other::Body(j) => ball.distance(&(*balls.get(j)?)?),
-            Other::Wall(w) => self.walls[w].height(&ball.center) - ball.radius,
-        };
-        // Room for rounding.
-        let slack = 1e-14 * (ball.center.norm() + ball.radius + bound.abs());
-        bound.is_finite().then_some(bound - slack)
+    /// A pair's gap; none where a pose is missing or isn't finite.
+    pub(crate) fn between(&self, pair: (usize, Other), poses: &[Pose]) -> Option<Gap> {
+        self.gap(pair, poses, f64::INFINITY)
     }
 
     /// A pair's gap if it is below `limit`.

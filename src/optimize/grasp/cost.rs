@@ -171,16 +171,16 @@ impl GraspCost {
         let object = self.grip.object;
         let contact = rollout.simulator().system().contact.as_ref()?;
         let mut nearest: Option<(f64, Vec6)> = None;
-        for (k, pair) in contact.shapes.pairs().iter().enumerate() {
+        for pair in contact.shapes.pairs() {
             let sign = match (pair.first, pair.second_body()) {
                 (a, Some(b)) if a == object && b == finger => 1.0,
                 (a, Some(b)) if a == finger && b == object => -1.0,
                 _ => continue,
             };
             // Distances that can't be found count for nothing here; the step says so.
-            let points = contact.shapes.points_within(k, poses, FAR);
+            let points = contact.shapes.points_within(&pair, poses, FAR);
             for p in points.unwrap_or_default() {
-                let beyond = p.gap - contact.laws[k].gap;
+                let beyond = p.gap - contact.laws.of(&pair).gap;
                 if nearest.is_none_or(|(least, _)| beyond < least) {
                     nearest = Some((beyond, sign * p.slopes.gap));
                 }

@@ -232,7 +232,8 @@ impl<'a> Case<'a> {
         let clearance = &self.subject.water.clearance;
         let poses = self.subject.poses;
         let lacks = |gaps: &Gaps| {
-            let all = gaps.all(poses).into_iter();
+            let coarsest = resolved.iter().map(|r| r.everywhere).fold(0.0, f64::max);
+            let all = gaps.within(poses, coarsest).into_iter();
             let ratios = all.filter_map(|gap| narrowest(gaps, &gap, poses, resolved));
             ratios.map(|(ratio, _)| 1.0 / ratio).fold(1.0, f64::max)
         };

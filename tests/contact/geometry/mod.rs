@@ -5,6 +5,7 @@ mod extremes;
 mod gjk;
 mod invariance;
 mod known;
+mod neighbours;
 mod slopes;
 mod smooth;
 

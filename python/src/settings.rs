@@ -63,6 +63,8 @@ pub struct Keywords<'a> {
     pub resolved_gap: Option<f64>,
     /// Whether gaps that compressed bodies or panels don't resolve have films: unless told not to.
     pub films: Option<bool>,
+    /// How compressed bodies are coupled.
+    pub exchange: Option<&'a str>,
     /// Shapes with respect to which gradients are wanted.
     pub shape_parameters: Option<Vec<String>>,
     /// What computes the coupling.
@@ -83,6 +85,7 @@ impl Keywords<'_> {
             rank: self.rank,
             resolved_gap: positive("resolved_gap", self.resolved_gap)?,
             films: self.films,
+            exchange: choice("exchange", self.exchange)?,
             shape_parameters: self.shape_parameters,
             backend: choice("backend", self.backend)?,
             ..Settings::default()

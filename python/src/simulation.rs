@@ -153,7 +153,7 @@ impl Simulator {
     #[new]
     #[pyo3(signature = (
         scene, dt=None, *, fidelity=None, method=None, tolerance=None, integrator=None, faces=None, accuracy=None,
-        rank=None, resolved_gap=None, films=None, shape_parameters=None, cache=None, backend=None
+        rank=None, resolved_gap=None, films=None, exchange=None, shape_parameters=None, cache=None, backend=None
     ))]
     #[expect(
         clippy::too_many_arguments,
@@ -172,6 +172,7 @@ impl Simulator {
         #[pyo3(from_py_with = counts::rank)] rank: Option<usize>,
         resolved_gap: Option<f64>,
         films: Option<bool>,
+        exchange: Option<&str>,
         shape_parameters: Option<Vec<String>>,
         cache: Option<PathBuf>,
         backend: Option<&str>,
@@ -187,6 +188,7 @@ impl Simulator {
             rank,
             resolved_gap,
             films,
+            exchange,
             shape_parameters,
             backend,
         };

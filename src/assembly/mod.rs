@@ -121,7 +121,10 @@ pub(crate) fn assemble(
             scene.bodies.len(),
             tree.velocities()
         ),
-        memory::numbers(numbers(&tree, coupled(scene, choices))),
+        memory::numbers(numbers(
+            &tree,
+            coupled(scene, choices) && !by_products(scene, choices),
+        )),
         "use fewer bodies, or several scenes where they don't feel each other",
     )?;
     let surfaces = water::surfaces(scene, &choices.water)?;
@@ -268,6 +271,12 @@ pub(crate) fn assemble(
         surfaces: Default::default(),
         flow_surfaces: Default::default(),
     })
+}
+
+/// Whether no matrix is formed of bodies that feel one another.
+fn by_products(scene: &Scene, choices: &Choices) -> bool {
+    let exchange = choices.water.numerics.exchange;
+    exchange.expected(scene, !choices.integrator.solves_contact())
 }
 
 /// Numbers that a step takes at once. Where bodies feel each other through the water, of all velocities with all: the mass matrix with its factor and that of the

@@ -11,7 +11,7 @@ use crate::coupling::full::{FullSolver, Preconditioner};
 use crate::dynamics::Integrator;
 use crate::scene::{BadMeshes, Base, Followers, Preset, Robot, Scene, Wet};
 use crate::simulate::{
-    AdapterName, Arithmetic, Backend, Fidelity, GpuSettings, Method, Settings, Simulator,
+    AdapterName, Arithmetic, Backend, Exchange, Fidelity, GpuSettings, Method, Settings, Simulator,
 };
 use crate::{Error, Result};
 
@@ -38,6 +38,9 @@ pub(super) struct Water {
     /// down to contact.
     #[arg(long)]
     pub no_films: bool,
+    /// With `reduced` and `auto`: how compressed bodies are coupled [default: auto].
+    #[arg(long, value_parser = choice::<Exchange>())]
+    pub exchange: Option<Exchange>,
     /// Folder that keeps compressed bodies for the next time.
     #[arg(long, value_name = "FOLDER")]
     pub cache: Option<PathBuf>,
@@ -217,6 +220,7 @@ impl Water {
             resolved_gap: self.resolved_gap,
             accuracy: self.accuracy,
             films: self.no_films.then_some(false),
+            exchange: self.exchange,
             faces: self.faces,
             backend: Some(self.backend),
             gpu: Some(self.adapter.settings(self.gpu_fallback)),

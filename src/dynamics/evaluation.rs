@@ -311,7 +311,10 @@ impl<'a> Evaluation<'a> {
     }
 
     /// What the coupling reports.
-    pub fn report(&self) -> &CouplingReport {
-        &self.report
+    pub fn report(&self) -> CouplingReport {
+        match &self.fluid {
+            FluidMomenta::Scattered(at) => at.report(),
+            _ => self.report.clone(),
+        }
     }
 }

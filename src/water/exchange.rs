@@ -3,11 +3,12 @@
 use super::method::kind::Problem;
 use crate::coupling::reduced::ReducedBody;
 use crate::coupling::scattering::{Levels, Scattering};
+use crate::scene::Scene;
 use crate::{Error, Result};
 use std::sync::Arc;
 
 /// Bodies from which on products alone are faster (`cargo bench --bench bodies`).
-const MANY: usize = 16;
+const MANY: usize = 24;
 
 choices! {
     /// How compressed bodies are coupled.
@@ -23,6 +24,15 @@ choices! {
 }
 
 impl Exchange {
+    /// Whether it will be by products as far as the scene alone tells, `steps` being whether the integrator needs no matrix: for what a scene takes.
+    pub(crate) fn expected(self, scene: &Scene, steps: bool) -> bool {
+        match self {
+            Exchange::Factor => false,
+            Exchange::Products => true,
+            Exchange::Auto => steps && scene.walls.is_empty() && scene.bodies.len() >= MANY,
+        }
+    }
+
     /// Whether it is by products, `steps` being whether the integrator needs no matrix.
     ///
     /// # Errors

@@ -3,8 +3,10 @@
 use super::Scattering;
 use super::scattered::{Answer, Motions, Scattered};
 use crate::adjoint::lie::{Pose, Vec6};
+use crate::boundary::PanelBoundary;
 use crate::coupling::{
-    Carried, Coupling, CouplingReport, Direction, Linearised, Momenta, Pullback, Tangent,
+    Carried, Coupling, CouplingReport, Direction, Linearised, Momenta, Motion, MotionBar, Pullback,
+    SurfacePotential, Tangent,
 };
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -202,6 +204,14 @@ impl Linearised for ScatteredLinearised<'_> {
     }
 }
 
+fn untold(what: &str) -> Error {
+    Error::Unsupported {
+        what: format!("{what} with many bodies coupled by products"),
+        why: "they tell impulses and wrenches alone".into(),
+        instead: "set exchange to factor".into(),
+    }
+}
+
 impl Coupling for Scattering {
     fn name(&self) -> &'static str {
         "the fidelity reduced, for many bodies"
@@ -226,6 +236,23 @@ impl Coupling for Scattering {
 
     fn scattering(&self) -> Option<&Scattering> {
         Some(self)
+    }
+
+    fn surface_potentials(
+        &self,
+        _motion: &Motion,
+        _surfaces: &[Arc<PanelBoundary>],
+    ) -> Result<Vec<SurfacePotential>> {
+        Err(untold("the flow on surfaces and at points"))
+    }
+
+    fn surface_potentials_vjp(
+        &self,
+        _motion: &Motion,
+        _surfaces: &[Arc<PanelBoundary>],
+        _bars: &[SurfacePotential],
+    ) -> Result<MotionBar> {
+        Err(untold("the derivative of the flow"))
     }
 }
 

@@ -1,6 +1,10 @@
-//! How the cost of a step grows with the bodies where none feels another (`isolated`): free ones, and one chain of revolute joints, as a ratio to 25 bodies in the same run.
+//! How the cost of a step grows with the bodies: where all feel each other, by products and by the factor; and where none feels another (`isolated`), free ones, and one chain of
+//! revolute joints, as a ratio to 25 bodies in the same run.
 //!
-//! `cargo bench --bench bodies`. The least of all rounds counts. Preparing is one body's, whose shape the others share, and the checks of the scene.
+//! `cargo bench --bench bodies [-- coupled|isolated] [MOST]`, MOST the largest number of bodies that feel each other (4096); `-- errors [N]` compares N random configurations (100) with the
+//! factor. The least of all rounds counts of isolated bodies. Preparing is one body's, whose shape the others share, and the checks of the scene.
+
+mod coupled;
 
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
@@ -60,6 +64,26 @@ fn milliseconds(
 }
 
 fn main() -> hydrograd::Result<()> {
+    let given: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with("--"))
+        .collect();
+    let number = given.iter().find_map(|a| a.parse().ok());
+    let asked = |name: &str| given.iter().any(|a| a == name);
+    if asked("errors") {
+        return coupled::errors(number.unwrap_or(100) as u64);
+    }
+    if !asked("isolated") {
+        coupled::iterations()?;
+        coupled::sizes(number.unwrap_or(4096))?;
+    }
+    if !asked("coupled") {
+        isolated()?;
+    }
+    Ok(())
+}
+
+fn isolated() -> hydrograd::Result<()> {
     let kinds = [
         (false, Integrator::Rk4, "free, RK4", 800),
         (true, Integrator::Rk4, "a chain, RK4", 800),
@@ -71,7 +95,7 @@ fn main() -> hydrograd::Result<()> {
         ),
     ];
     println!(
-        "| bodies | | ms to prepare | ms a step | of 25 bodies' | ms with gradient | of 25 bodies' |\n|---|---|---|---|---|---|---|"
+        "\n| bodies | | ms to prepare | ms a step | of 25 bodies' | ms with gradient | of 25 bodies' |\n|---|---|---|---|---|---|---|"
     );
     for (chained, integrator, name, most) in kinds {
         let mut first = None;

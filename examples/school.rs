@@ -4,8 +4,8 @@
 //! `cargo run --release --features cli --example school [BODIES [FOLDER]]`, by default 1,000 bodies, without files. With a folder, runs are written there as `straight.glb`, `pushed.glb` and
 //! `isolated.glb`, animated scenes that a browser or Blender shows.
 //!
-//! The large body is a sphere, as dense as the water, which begins with the speed of one of its radii a second; forces along two axes across its way are its controls. They are improved by the gradient of the whole
-//! rollout, all of the same mean square.
+//! The large body is a sphere, as dense as the water, which begins with the speed of one of its radii a second; forces on it are its controls. They are improved along the gradient of the whole
+//! rollout, their mean square bounded.
 
 use hydrograd::dynamics::Integrator;
 use hydrograd::objective::Objective;
@@ -24,9 +24,9 @@ const SMALL: f64 = 0.06;
 const PITCH: f64 = 0.2;
 const STEPS: usize = 30;
 const STEP: f64 = 0.05;
-/// Root of the mean square of the forces, N.
-const FORCE: f64 = 20.0;
-const IMPROVEMENTS: usize = 3;
+/// Largest root of the mean square of the forces, N.
+const FORCE: f64 = 60.0;
+const IMPROVEMENTS: usize = 5;
 
 /// Small ones on a grid with a tunnel for the large one, which starts before it.
 fn scene(bodies: usize) -> Scene {
@@ -90,15 +90,21 @@ impl Objective for Moved {
     }
 }
 
-/// Forces across the way alone, of the mean square asked for.
-fn scaled(mut forces: DMatrix<f64>) -> DMatrix<f64> {
-    for (i, mut row) in forces.row_iter_mut().enumerate() {
-        if i != 1 && i != 2 {
-            row.fill(0.0);
-        }
-    }
-    let size = (forces.norm_squared() / forces.ncols() as f64).sqrt();
-    if size > 0.0 {
+/// Forces alone, without torques.
+fn pushing(mut forces: DMatrix<f64>) -> DMatrix<f64> {
+    forces.rows_mut(3, 3).fill(0.0);
+    forces
+}
+
+/// Root of the forces' mean square over the steps, N.
+fn mean(forces: &DMatrix<f64>) -> f64 {
+    (forces.norm_squared() / forces.ncols() as f64).sqrt()
+}
+
+/// The same forces, scaled down to the largest mean square.
+fn within(forces: DMatrix<f64>) -> DMatrix<f64> {
+    let size = mean(&forces);
+    if size > FORCE {
         forces * (FORCE / size)
     } else {
         forces
@@ -145,17 +151,23 @@ fn main() -> Result<()> {
     told("with coupling, straight through", &straight, started);
     write("straight.glb", &straight)?;
     let started = Instant::now();
-    let mut forces = scaled(straight.gradient(&Moved)?.controls);
-    let mut pushed = simulator.rollout(&Controls::from_matrix(&simulator, forces.clone())?)?;
-    for _ in 1..IMPROVEMENTS {
-        forces = scaled(pushed.gradient(&Moved)?.controls);
-        pushed = simulator.rollout(&Controls::from_matrix(&simulator, forces.clone())?)?;
+    let still = straight.value(&Moved)?;
+    let (mut pushed, mut length) = (straight, 0.3 * FORCE);
+    for _ in 0..IMPROVEMENTS {
+        let upwards = pushing(pushed.gradient(&Moved)?.controls);
+        let step = upwards.scale(length / mean(&upwards).max(f64::MIN_POSITIVE));
+        let forces = within(pushed.controls() + step);
+        let next = simulator.rollout(&Controls::from_matrix(&simulator, forces)?)?;
+        match next.value(&Moved)? > pushed.value(&Moved)? {
+            true => pushed = next,
+            false => length *= 0.3,
+        }
     }
-    told("pushed across its way by the gradient", &pushed, started);
+    told("pushed along the gradient", &pushed, started);
     write("pushed.glb", &pushed)?;
     println!(
         "the centre goes {:.2} times as far",
-        (pushed.value(&Moved)? / straight.value(&Moved)?).sqrt()
+        (pushed.value(&Moved)? / still).sqrt()
     );
     Ok(())
 }
@@ -165,7 +177,8 @@ fn the_gradient_moves_the_school_further() -> Result<()> {
     let scene = scene(60);
     let simulator = run(&scene, Fidelity::Reduced)?;
     let straight = simulator.rollout(&Controls::zeros(&simulator, 4))?;
-    let forces = scaled(straight.gradient(&Moved)?.controls);
+    let upwards = pushing(straight.gradient(&Moved)?.controls);
+    let forces = within(upwards.scale(0.1 * FORCE / mean(&upwards)));
     let pushed = simulator.rollout(&Controls::from_matrix(&simulator, forces)?)?;
     let alone = run(&scene, Fidelity::Isolated)?;
     let alone = alone.rollout(&Controls::zeros(&alone, 4))?;

@@ -35,6 +35,11 @@ mod water;
 
 /// The book's programs are tested.
 #[cfg(doctest)]
+#[doc = include_str!("../docs/many-bodies.md")]
+mod many_bodies {}
+
+/// The same of another page.
+#[cfg(doctest)]
 #[doc = include_str!("../docs/gradients.md")]
 mod gradients {}
 

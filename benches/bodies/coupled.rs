@@ -140,8 +140,8 @@ fn peak() -> Option<f64> {
     Some(1024.0 * kilobytes)
 }
 
-/// The table of steps against the number of bodies, up to `most`.
-pub fn sizes(most: usize) -> hydrograd::Result<()> {
+/// The table of steps against the number of bodies, up to `most`, of the kinds that are asked for.
+pub fn sizes(most: usize, asked: impl Fn(&str) -> bool) -> hydrograd::Result<()> {
     println!(
         "\n{ACCURACY} asked for, RK2, {} threads; memory is the process's peak so far over that at the start, for each point of a body\n\n| bodies | | points | ms to prepare | ms a step | with gradient | of a step | kB a point | by the factor: times as long | with gradient | accelerations differ by |\n|---|---|---|---|---|---|---|---|---|---|---|",
         rayon::current_num_threads()
@@ -150,8 +150,11 @@ pub fn sizes(most: usize) -> hydrograd::Result<()> {
     for (kind, name) in [
         (Kind::Spheres, "spheres"),
         (Kind::Ellipsoids, "ellipsoids"),
-        (Kind::Fish, "links of fish"),
+        (Kind::Fish, "fish"),
     ] {
+        if !asked(name) {
+            continue;
+        }
         let mut last: Option<(usize, f64)> = None;
         for count in SIZES.into_iter().filter(|n| *n <= most) {
             let scene = scene(kind, count, 7);

@@ -32,6 +32,7 @@ _Progress = Callable[[int, int], object]
 _Evaluated = tuple[float, ArrayLike]
 _Part = Literal["tangential", "normal", "total"]
 _Backend = Literal["cpu", "gpu"]
+_Exchange = Literal["auto", "factor", "products"]
 _Fidelity = Literal["isolated", "reduced", "auto", "full"]
 _Method = Literal["auto", "exact", "panel", "mfs-vertex", "mfs-face"]
 _Integrator = Literal["momentum-euler", "energy-euler", "midpoint", "rk2", "rk4", "velocity-euler"]
@@ -568,7 +569,7 @@ class Simulator:
     "mfs-vertex" or "mfs-face". `integrator`: "momentum-euler", "energy-euler", "midpoint", "rk2", "rk4" or "velocity-euler". `tolerance` is the
     relative residual at which iterative solves stop ("full"), `faces` the number of triangles of shapes by formula.
     `accuracy` (relative), `rank` (points a body) and `resolved_gap` (m) belong to "reduced" and "auto", `films` (False: the water in gaps that aren't
-    resolved isn't added as films) to them and to "full" by panels. `shape_parameters` are names of shape parameters ("finger.size.y"), or what these begin with ("finger"; "hull.vertex" for all
+    resolved isn't added as films) to them and to "full" by panels. `exchange` says how compressed bodies are coupled: "factor", "products" (many bodies, about linear in their number), or "auto" (the default). `shape_parameters` are names of shape parameters ("finger.size.y"), or what these begin with ("finger"; "hull.vertex" for all
     vertices of a mesh), or "*": gradients have entries for them. `cache` is a folder that keeps compressed bodies. `backend`: "cpu" (the default), or "gpu" in a build with the feature of that name."""
     def __new__(
         cls,
@@ -584,6 +585,7 @@ class Simulator:
         rank: int | None = None,
         resolved_gap: float | None = None,
         films: bool | None = None,
+        exchange: _Exchange | None = None,
         shape_parameters: list[str] | None = None,
         cache: _Path | None = None,
         backend: _Backend | None = None,

@@ -1,7 +1,7 @@
 //! Momenta of the water that moves with the bodies, as linear maps of what moves it.
 
 use super::System;
-use super::recoil::TreeMotions;
+use super::tree_motions::TreeMotions;
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6, six};
 use crate::coupling::scattering::Scattered;

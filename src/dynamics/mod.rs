@@ -36,6 +36,7 @@ mod stiffness;
 mod symmetry;
 mod system;
 mod ties;
+mod tree_motions;
 
 pub use armature::Armature;
 pub use body::{BodyData, SiteData};

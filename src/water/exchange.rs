@@ -1,14 +1,9 @@
 //! How what bodies exchange with each other is computed: by a factor of all of it, or by products alone.
 
-use super::method::kind::Problem;
-use crate::coupling::reduced::ReducedBody;
-use crate::coupling::scattering::{Levels, Scattering};
 use crate::scene::Scene;
-use crate::{Error, Result};
-use std::sync::Arc;
 
 /// Bodies from which on products alone are faster (`cargo bench --bench bodies`).
-const MANY: usize = 24;
+pub(super) const MANY: usize = 24;
 
 choices! {
     /// How compressed bodies are coupled.
@@ -32,39 +27,4 @@ impl Exchange {
             Exchange::Auto => steps && scene.walls.is_empty() && scene.bodies.len() >= MANY,
         }
     }
-
-    /// Whether it is by products, `steps` being whether the integrator needs no matrix.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] where they were asked for and something doesn't take them.
-    pub(super) fn by_products(self, problem: &Problem, steps: bool, on_cpu: bool) -> Result<bool> {
-        let given = problem.bodies.iter().any(|b| b.added_mass.is_some());
-        let without = [
-            (!problem.walls.is_empty(), "rigid walls and free surfaces"),
-            (given, "given added masses"),
-            (!problem.changes.is_empty(), "shape parameters"),
-            (!on_cpu, "the backend gpu"),
-        ];
-        let refused = without.into_iter().find(|(there, _)| *there);
-        match (self, refused) {
-            (Exchange::Factor, _) | (Exchange::Auto, Some(_)) => Ok(false),
-            (Exchange::Auto, None) => Ok(steps && problem.bodies.len() >= MANY),
-            (Exchange::Products, None) => Ok(true),
-            (Exchange::Products, Some((_, what))) => Err(Error::Unsupported {
-                what: format!("exchange by products with {what}"),
-                why: "it isn't there yet".into(),
-                instead: "leave the setting exchange to auto, or use factor".into(),
-            }),
-        }
-    }
-}
-
-/// The bodies coupled by products.
-///
-/// # Errors
-/// An accuracy out of range.
-pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Result<Scattering> {
-    let names = problem.bodies.iter().map(|b| b.name.to_string()).collect();
-    let levels = Levels::for_accuracy(problem.numerics.accuracy)?;
-    Scattering::new(made, names, problem.start, levels)?.excluding(&problem.excluded)
 }

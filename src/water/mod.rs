@@ -50,6 +50,7 @@ mod lubrication_limits;
 mod method;
 mod numerics;
 mod prepared;
+mod products;
 mod resolved;
 mod shape;
 mod submerged;

@@ -9,6 +9,7 @@ use super::fidelity::{self, Fidelity};
 use super::gap_model::GapModel;
 use super::method::kind::{BodyMethod, Problem};
 use super::numerics::Plan;
+use super::products::by_products;
 use super::resolved::Resolved;
 use super::shape::ShapeChange;
 use super::submerged::{Discretisation, SubmergedBody};
@@ -81,7 +82,7 @@ pub(crate) fn prepare(
     let compressed = scene.fluid.density > 0.0 && choices.fidelity.kind().compresses();
     let on_cpu = choices.backend == Backend::Cpu;
     problem.products =
-        compressed && (choices.numerics.exchange).by_products(&problem, explicit, on_cpu)?;
+        compressed && by_products(choices.numerics.exchange, &problem, explicit, on_cpu)?;
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,

@@ -27,9 +27,8 @@ mod places;
 mod scattered;
 mod sums;
 
-pub use levels::Levels;
+pub use levels::{Apart, Levels};
 pub use linearised::ScatteredLinearised;
-pub use pairs::Apart;
 pub use scattered::{Answer, Motions, Recoiled, Scattered};
 
 use super::Exclusions;

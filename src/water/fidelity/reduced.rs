@@ -7,10 +7,10 @@ use crate::boundary::Response;
 use crate::coupling::reduced::{self, ReducedBody, Region, ShapeSlope, cache, compress};
 use crate::geometry::{Gap, TriMesh};
 use crate::water::device::Device;
-use crate::water::exchange;
 use crate::water::gap_error::Carried;
 use crate::water::method::kind::{BodyMethod, Problem};
 use crate::water::numerics::Numerics;
+use crate::water::products;
 use crate::water::shape::ShapeChange;
 use crate::water::submerged::{Discretisation, Made, SubmergedBody};
 use crate::water::surface::Coarse;
@@ -105,7 +105,7 @@ fn many(problem: &Problem) -> Result<Made> {
         films: Vec::new(),
         warnings: [warnings(problem, &made), unkept].concat(),
         bodies: problem.named(as_made(problem, &made)?),
-        coupling: Box::new(exchange::scattering(problem, made)?),
+        coupling: Box::new(products::scattering(problem, made)?),
     })
 }
 

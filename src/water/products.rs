@@ -1,0 +1,48 @@
+//! Compressed bodies that are coupled by products alone: whether, and how.
+
+use super::exchange::{Exchange, MANY};
+use super::method::kind::Problem;
+use crate::coupling::reduced::ReducedBody;
+use crate::coupling::scattering::{Levels, Scattering};
+use crate::{Error, Result};
+use std::sync::Arc;
+
+/// Whether bodies are coupled by products, `steps` being whether the integrator needs no matrix.
+///
+/// # Errors
+/// [`Error::Unsupported`] where they were asked for and something doesn't take them.
+pub(super) fn by_products(
+    exchange: Exchange,
+    problem: &Problem,
+    steps: bool,
+    on_cpu: bool,
+) -> Result<bool> {
+    let given = problem.bodies.iter().any(|b| b.added_mass.is_some());
+    let without = [
+        (!problem.walls.is_empty(), "rigid walls and free surfaces"),
+        (given, "given added masses"),
+        (!problem.changes.is_empty(), "shape parameters"),
+        (!on_cpu, "the backend gpu"),
+    ];
+    let refused = without.into_iter().find(|(there, _)| *there);
+    match (exchange, refused) {
+        (Exchange::Factor, _) | (Exchange::Auto, Some(_)) => Ok(false),
+        (Exchange::Auto, None) => Ok(steps && problem.bodies.len() >= MANY),
+        (Exchange::Products, None) => Ok(true),
+        (Exchange::Products, Some((_, what))) => Err(Error::Unsupported {
+            what: format!("exchange by products with {what}"),
+            why: "it isn't there yet".into(),
+            instead: "leave the setting exchange to auto, or use factor".into(),
+        }),
+    }
+}
+
+/// The bodies coupled by products.
+///
+/// # Errors
+/// An accuracy out of range.
+pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Result<Scattering> {
+    let names = problem.bodies.iter().map(|b| b.name.to_string()).collect();
+    let levels = Levels::for_accuracy(problem.numerics.accuracy)?;
+    Scattering::new(made, names, problem.start, levels)?.excluding(&problem.excluded)
+}

@@ -50,6 +50,13 @@ fn registered() -> Vec<(String, Rung)> {
 
 /// Rungs on a GPU, each with the shader whose comparison in tests/gpu holds it against its twin on the CPU.
 const ON_DEVICE: &[(&str, &str)] = &[
+    ("gpu::batch::solved::SolvedTogether::gradient", "batch_pull"),
+    (
+        "gpu::batch::solved::SolvedTogether::gradient_along",
+        "batch_tangent",
+    ),
+    ("gpu::batch::solved::SolvedTogether::vjp", "batch_pull"),
+    ("gpu::batch::solved::SolvedTogether::hvp", "batch_tangent"),
     ("gpu::response::Solution::gradient", "pair_vjp"),
     (
         "gpu::reduced::linearised::GpuLinearised::gradient",
@@ -136,6 +143,27 @@ const THROUGH: &[(&str, &str)] = &[
     (
         "coupling::reduced::surface::ReducedLinearised::potentials_vjp",
         "coupling::reduced::linearised::Reduced::surface_potentials_vjp",
+    ),
+    (
+        "gpu::batch::coupled::Seats::surface_potentials_vjp",
+        "coupling::reduced::linearised::Reduced::surface_potentials_vjp",
+    ),
+    (
+        "coupling::scattering::linearised::Scattering::surface_potentials_vjp",
+        "coupling::isolated::Isolated::surface_potentials_vjp",
+    ),
+    // The sums of many bodies, in numbers and in dual numbers.
+    (
+        "coupling::scattering::sums::Sums::gradient",
+        "coupling::scattering::linearised::ScatteredLinearised::gradient",
+    ),
+    (
+        "coupling::scattering::scattered::Scattered::gradient",
+        "coupling::scattering::linearised::ScatteredLinearised::gradient",
+    ),
+    (
+        "coupling::scattering::scattered::Scattered::gradient_jvp",
+        "coupling::scattering::linearised::ScatteredLinearised::hvp",
     ),
     (
         "gpu::reduced::GpuReduced::surface_potentials_vjp",

@@ -3,7 +3,7 @@
 //! What isn't asked for ends these tests with "memory allocation of … bytes failed".
 
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
-use hydrograd::simulate::{Method, Variables};
+use hydrograd::simulate::{Exchange, Method, Variables};
 use hydrograd::{Controls, Fidelity, Result, Settings, Simulator};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -89,8 +89,11 @@ fn hungry() -> Vec<(&'static str, Work)> {
             Box::new(|| by_fundamental_solutions(Fidelity::Full, 2000)),
         ),
         (
-            "many coupled bodies",
-            Box::new(|| simulator(&blocks(400, 20), Fidelity::Reduced).map(drop)),
+            "many bodies coupled by a factor",
+            Box::new(|| {
+                let settings = Settings::default().fidelity(Fidelity::Reduced);
+                Simulator::new(&blocks(400, 20), settings.exchange(Exchange::Factor)).map(drop)
+            }),
         ),
         (
             "a long run",

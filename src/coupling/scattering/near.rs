@@ -205,13 +205,17 @@ pub(super) struct Distances {
     all: Vec<f64>,
 }
 
-/// Numbers kept for each point.
+/// Numbers kept for each point, and in all: 32 MB.
 const KEPT: usize = 96;
+const MOST: usize = 1 << 22;
 
 impl Distances {
     pub fn new(pairs: &[Near], points: &[Range<usize>], places: &Places<f64>) -> Self {
-        let room = KEPT * places.points[0].len();
-        let mut out = Self::default();
+        let room = MOST.min(KEPT * places.points[0].len());
+        let mut out = Self {
+            ends: Vec::new(),
+            all: Vec::with_capacity(room),
+        };
         for near in pairs {
             let [a, b] = near.bodies.map(|b| points[b].clone());
             if out.all.len() + a.len() * b.len() > room {

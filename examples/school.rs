@@ -133,7 +133,14 @@ fn told(name: &str, rollout: &Rollout, started: Instant) {
 
 fn main() -> Result<()> {
     let given: Vec<String> = std::env::args().skip(1).collect();
-    let bodies = given.first().and_then(|n| n.parse().ok()).unwrap_or(1000);
+    let bodies = match given.first().map(|n| n.parse()) {
+        None => 1000,
+        Some(Ok(bodies)) if bodies > 0 => bodies,
+        Some(_) => {
+            eprintln!("usage: school [BODIES [FOLDER]], BODIES at least 1");
+            return Ok(());
+        }
+    };
     let write = |name: &str, rollout: &Rollout| match given.get(1) {
         Some(folder) => gltf::write(rollout, &Path::new(folder).join(name), &Default::default()),
         None => Ok(()),

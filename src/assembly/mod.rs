@@ -21,7 +21,7 @@ use crate::memory;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene, Site};
-use crate::water::{self, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
+use crate::water::{self, Backend, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
 use crate::{Error, Result};
 use bodies::{body_values, elements, hull};
 use nalgebra::DVector;
@@ -276,7 +276,11 @@ pub(crate) fn assemble(
 /// Whether no matrix is formed of bodies that feel one another.
 fn by_products(scene: &Scene, choices: &Choices) -> bool {
     let exchange = choices.water.numerics.exchange;
-    exchange.expected(scene, !choices.integrator.solves_contact())
+    let water = &choices.water;
+    let compressed = water.backend == Backend::Cpu && choices.shape_parameters.is_empty();
+    compressed
+        && water.fidelity.kind().compresses()
+        && exchange.expected(scene, !choices.integrator.solves_contact())
 }
 
 /// Numbers that a step takes at once. Where bodies feel each other through the water, of all velocities with all: the mass matrix with its factor and that of the

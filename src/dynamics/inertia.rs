@@ -134,8 +134,16 @@ impl<'a> Evaluation<'a> {
                 driven + factor.solve(&right)
             }
         };
-        self.fluid.check()?;
+        self.check()?;
         Ok(v)
+    }
+
+    /// Whether the water's solves so far met their tolerance.
+    ///
+    /// # Errors
+    /// The first that didn't.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.fluid.check()
     }
 
     /// M v of bodies with these added masses that don't feel each other.
@@ -173,6 +181,8 @@ impl<'a> Evaluation<'a> {
     }
 
     fn factored_dense(&self, free: &[usize]) -> Result<Inertia<'a>> {
+        self.mass_matrix();
+        self.check()?;
         let block = self.mass_matrix().select_rows(free).select_columns(free);
         let smallest = smallest_scaled_eigenvalue(&block);
         let refused = || unresolved(self.weakest(free), smallest);

@@ -160,6 +160,12 @@ pub(crate) fn prepare(
         resolved,
     };
     let mut reasons = planned.reasons;
+    if problem.products {
+        reasons.push(format!(
+            "{} bodies are coupled by products alone: films don't act in narrow gaps, and flow, pressure and sensors aren't told (setting exchange)",
+            numbers.len()
+        ));
+    }
     if choices.fidelity.kind().chooses()
         && let Some(gap) = clearance.moving.smallest(poses)
         && let Some(error) = gap_model.error(&clearance, &gap, poses)

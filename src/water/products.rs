@@ -23,6 +23,7 @@ pub(super) fn by_products(
         (given, "given added masses"),
         (!problem.changes.is_empty(), "shape parameters"),
         (!on_cpu, "the backend gpu"),
+        (problem.mimics, "joints that follow others"),
     ];
     let refused = without.into_iter().find(|(there, _)| *there);
     match (exchange, refused) {
@@ -43,6 +44,12 @@ pub(super) fn by_products(
 /// An accuracy out of range.
 pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Result<Scattering> {
     let names = problem.bodies.iter().map(|b| b.name.to_string()).collect();
-    let levels = Levels::for_accuracy(problem.numerics.accuracy)?;
+    let numerics = problem.numerics;
+    // What was chosen for the bodies of a scene follows from the accuracy already.
+    let aim = match problem.plan.compress.is_empty() {
+        true => numerics.accuracy.min(numerics.compress.tolerance),
+        false => numerics.accuracy,
+    };
+    let levels = Levels::for_accuracy(aim)?;
     Scattering::new(made, names, problem.start, levels)?.excluding(&problem.excluded)
 }

@@ -273,7 +273,8 @@ fn rollouts_agree_keep_momentum_and_have_gradients() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
-    let scene = swarm(20, 0.5, 1100.0);
+    // So many that all sums are cut into parts.
+    let scene = swarm(300, 0.5, 1100.0);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -282,12 +283,12 @@ fn any_number_of_threads_gives_the_same_bits() {
         pool.install(|| {
             let settings = settings(Exchange::Products, Integrator::Rk2);
             let simulator = Simulator::new(&scene, settings).unwrap();
-            let controls = Controls::zeros(&simulator, 2);
+            let controls = Controls::zeros(&simulator, 1);
             let rollout = simulator.rollout(&controls).unwrap();
             let gradient = rollout
                 .gradient(&objective::final_velocity(0, 0.0, 1.0))
                 .unwrap();
-            (rollout.samples()[2].v.clone(), gradient.initial.q.clone())
+            (rollout.samples()[1].v.clone(), gradient.initial.q.clone())
         })
     };
     let one = run(1);

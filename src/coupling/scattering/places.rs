@@ -144,7 +144,7 @@ impl<T: Number> Places<T> {
         let mut out = vec![[zero; 3]; cells.leaf.len()];
         for (i, bar) in radii.iter().enumerate() {
             let own = cells.bodies(i);
-            if own.len() < 2 || *bar == zero {
+            if own.len() < 2 {
                 continue;
             }
             // r = (Σ eⁿ)^(1/n), e the reach: ∂r/∂arm = (e/r)ⁿ⁻¹ arm/|arm|.

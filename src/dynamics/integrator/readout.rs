@@ -24,7 +24,9 @@ pub(super) fn solve_jvp(
 ) -> Result<DMatrix<f64>> {
     let right = e.frame_matrix().tr_mul(&at.y) + e.frame_momentum_slope(hat) * &at.q
         - momentum.along(&at.q, None, inputs);
-    Ok(e.factored(&split.free)?.solve_columns(&right))
+    let found = e.factored(&split.free)?.solve_columns(&right);
+    e.check()?;
+    Ok(found)
 }
 
 /// Transpose of [`solve`], added to `bar` (y is p̂ here).

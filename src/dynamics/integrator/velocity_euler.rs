@@ -21,7 +21,9 @@ fn acceleration<'a>(start: &Start<'_, 'a>) -> Result<(DVector<f64>, Inertia<'a>)
     }
     let right = e.inertial_force(v, &start.input.control)? - e.mass_times(&driven);
     let factor = e.factored(&split.free)?;
-    Ok((driven + factor.solve(&right), factor))
+    let found = driven + factor.solve(&right);
+    e.check()?;
+    Ok((found, factor))
 }
 
 pub(super) fn step(start: &Start) -> Result<(State, Stages)> {

@@ -236,8 +236,7 @@ pub(crate) fn assemble(
     }
     let mut water = water::prepare(
         scene,
-        &choices.water,
-        !choices.integrator.solves_contact(),
+        (&choices.water, !choices.integrator.solves_contact()),
         in_water,
         &poses,
         clearance,

@@ -63,8 +63,7 @@ const LEFT_OUT: f64 = 0.012;
 /// A device that can't be opened, bodies that the method or the fidelity can't take, or whatever the discretisation reports.
 pub(crate) fn prepare(
     scene: &Scene,
-    choices: &WaterChoices,
-    explicit: bool,
+    (choices, explicit): (&WaterChoices, bool),
     (numbers, submerged): (Vec<usize>, Vec<SubmergedBody>),
     poses: &[Pose],
     mut clearance: Clearance,

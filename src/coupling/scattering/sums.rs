@@ -196,7 +196,7 @@ impl<'s, T: Number> Sums<'s, T> {
     }
 
     /// What every point sees by the coefficients about its body's centre: the potential, and its gradient if it is asked for (zero else).
-    fn from_afar(&self, locals: &[T], slopes: bool) -> Vec<[T; 4]> {
+    fn seen_afar(&self, locals: &[T], slopes: bool) -> Vec<[T; 4]> {
         let (table, leaf) = (&self.model.table, &self.model.cells.leaf);
         let n = table.moments();
         let one = |b: usize| {
@@ -235,7 +235,7 @@ impl<'s, T: Number> Sums<'s, T> {
     pub fn potentials(&self, charges: &[T]) -> Vec<T> {
         let (locals, _) = self.locals(&self.moments(charges), false);
         let mut out = self.near(charges, false).potentials;
-        for (out, [seen, ..]) in out.iter_mut().zip(self.from_afar(&locals, false)) {
+        for (out, [seen, ..]) in out.iter_mut().zip(self.seen_afar(&locals, false)) {
             *out += seen;
         }
         out
@@ -261,7 +261,7 @@ impl<'s, T: Number> Sums<'s, T> {
             add(&mut centres[i], one, &slope);
             add(&mut centres[cell.parent], -one, &slope);
         }
-        let afar = self.from_afar(&locals, true);
+        let afar = self.seen_afar(&locals, true);
         for (b, leaf) in cells.leaf.iter().enumerate() {
             for j in self.model.points[b].clone() {
                 let [_, x, y, z] = afar[j];

@@ -131,7 +131,7 @@ fn wrenches_add_up_to_nothing_and_are_slopes_of_the_energy() {
     let poses = grid(&mut drawn, 27, 0.4);
     let (_, products) = both(&kinds, &poses, 0.01);
     let twists = DVector::from_fn(6 * 27, |_, _| drawn.next());
-    let basis = DMatrix::from_columns(&[twists.clone()]);
+    let basis = DMatrix::from_columns(std::slice::from_ref(&twists));
     let one = DVector::from_element(1, 1.0);
     let at = products.linearise(&poses, &basis).unwrap();
     let wrenches = at.gradient(&one, &one).unwrap();

@@ -1,6 +1,7 @@
 //! Bodies that feel each other: a step, its gradient, iterations, memory and errors against their number, by products and by the factor.
 
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
+use hydrograd::adjoint::sample::Samples;
 use hydrograd::coupling::scattering::{Levels, Motions, Scattering};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
@@ -16,23 +17,6 @@ const STEPS: usize = 4;
 const BY_FACTOR: usize = 64;
 const SIZES: [usize; 7] = [2, 4, 16, 64, 256, 1024, 4096];
 
-/// Numbers between −½ and ½.
-pub struct Drawn(pub u64);
-
-impl Drawn {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 33) as f64 / (1u64 << 31) as f64 - 0.5
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::from_fn(|_, _| self.next())
-    }
-}
-
 #[derive(Clone, Copy)]
 enum Kind {
     Spheres,
@@ -42,7 +26,7 @@ enum Kind {
 
 /// On a jittered grid with gaps of about a radius, `count` bodies; of fish three links each.
 fn scene(kind: Kind, count: usize, seed: u64) -> Scene {
-    let mut drawn = Drawn(seed);
+    let mut drawn = Samples::new(seed);
     let mut scene = Scene::new(Fluid::fresh_water());
     let groups = match kind {
         Kind::Fish => count.div_ceil(3),
@@ -56,7 +40,7 @@ fn scene(kind: Kind, count: usize, seed: u64) -> Scene {
     let mut v = Vec::new();
     for k in 0..groups {
         let cell = [k % side, k / side % side, k / side / side];
-        let jitter = 0.03 * drawn.vector();
+        let jitter = Vec3::from(drawn.vector(0.015));
         let at: [f64; 3] = std::array::from_fn(|i| pitch[i] * cell[i] as f64 + jitter[i]);
         let shape = match kind {
             Kind::Spheres => Shape::sphere(0.1),
@@ -66,7 +50,7 @@ fn scene(kind: Kind, count: usize, seed: u64) -> Scene {
         let link = || Body::new(shape.clone().faces(320)).density(1100.0);
         let name = format!("{k}");
         scene.add(link().named(name.clone()).at(at));
-        v.extend((0..6).map(|_| 0.2 * drawn.next()));
+        v.extend((0..6).map(|_| 0.1 * drawn.number()));
         if let Kind::Fish = kind {
             for (i, x) in [-0.22, 0.22].into_iter().enumerate() {
                 let joint = Joint::Revolute {
@@ -80,7 +64,7 @@ fn scene(kind: Kind, count: usize, seed: u64) -> Scene {
                 fin.motion = Some(vec![Motion::Sine {
                     amplitude: 0.3,
                     frequency: 1.0,
-                    phase: drawn.next(),
+                    phase: 0.5 * drawn.number(),
                     offset: 0.0,
                 }]);
                 scene.add(fin);
@@ -232,11 +216,11 @@ pub fn iterations() -> hydrograd::Result<()> {
     };
     let body = made.reduced_bodies()[0].clone();
     for gap in [2.0, 1.0, 0.5, 0.2] {
-        let mut drawn = Drawn(9);
+        let mut drawn = Samples::new(9);
         let pitch = 0.1 * (2.0 + gap);
         let at = |k: usize| pitch * Vec3::new((k % 4) as f64, (k / 4 % 4) as f64, (k / 16) as f64);
         let poses: Vec<Pose> = (0..64)
-            .map(|k| Pose::new(exp_matrix(&drawn.vector()), at(k)))
+            .map(|k| Pose::new(exp_matrix(&Vec3::from(drawn.vector(0.5))), at(k)))
             .collect();
         let names = (0..64).map(|k| k.to_string()).collect();
         let model = Scattering::new(
@@ -245,7 +229,7 @@ pub fn iterations() -> hydrograd::Result<()> {
             &poses,
             Levels::for_accuracy(1e-3)?,
         )?;
-        let first = DVector::from_fn(6 * 64, |_, _| drawn.next());
+        let first = DVector::from_fn(6 * 64, |_, _| 0.5 * drawn.number());
         let mut row = Vec::new();
         for density in [0.5, 1.0, 8.0] {
             let placed = model.place(&poses, Box::new(Free))?;

@@ -21,14 +21,19 @@ pub(super) fn end(ranges: &[Range<usize>]) -> usize {
     ranges.last().map_or(0, |r| r.end)
 }
 
-/// An outcome that met the tolerance; the residual of a recurrence may stall a little above at round-off.
+/// Whether a residual meets the tolerance; that of a recurrence may stall a little above at round-off.
+pub(super) fn met(residual: f64, tolerance: f64) -> bool {
+    residual <= tolerance.max(1e-13) * 1.001
+}
+
+/// An outcome that met the tolerance.
 pub(super) fn converged(
     outcome: Outcome,
     tolerance: f64,
     what: impl FnOnce() -> String,
     instead: &str,
 ) -> Result<Outcome> {
-    if outcome.residual <= tolerance.max(1e-13) * 1.001 {
+    if met(outcome.residual, tolerance) {
         return Ok(outcome);
     }
     Err(Error::Solver {

@@ -17,6 +17,7 @@ mod context;
 mod factor;
 pub mod full;
 mod kernel;
+mod lanczos;
 pub mod panel;
 mod pipeline;
 mod placed;

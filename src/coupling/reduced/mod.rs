@@ -39,6 +39,7 @@ pub use body::{CompressedParts, Fit, ReducedBody};
 pub use link::{Cutoff, Link};
 pub use region::Region;
 pub use slope::ShapeSlope;
+pub(super) use views::FLUX;
 
 use super::Exclusions;
 use super::film::Films;

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
 /// 4π: a source of strength α makes the flux 4πα.
-pub(super) const FLUX: f64 = 4.0 * PI;
+pub(in crate::coupling) const FLUX: f64 = 4.0 * PI;
 
 /// A nalgebra matrix as faer sees it.
 pub(super) fn view(m: &DMatrix<f64>) -> MatRef<'_, f64> {

@@ -1,19 +1,19 @@
 //! Derivatives of the energy of many bodies: of directions that are given by coefficients or by twists.
 
 use super::Scattering;
-use super::scattered::{Answer, Motions, Scattered};
+use super::places::Places;
+use super::scattered::{Answer, Motions, Scattered, mixed, plus};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::boundary::PanelBoundary;
+use crate::coupling::reduced::FLUX;
 use crate::coupling::{
     Carried, Coupling, CouplingReport, Direction, Linearised, Momenta, Motion, MotionBar, Pullback,
     SurfacePotential, Tangent,
 };
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::PI;
+use num_dual::Dual64;
 use std::sync::Arc;
-
-const FLUX: f64 = 4.0 * PI;
 
 /// Columns of a dense basis.
 struct Dense(DMatrix<f64>);
@@ -33,6 +33,13 @@ pub struct ScatteredLinearised<'a> {
     at: Arc<Scattered<'a>>,
     momenta: DMatrix<f64>,
     report: CouplingReport,
+}
+
+/// Rates of the impulses that bodies exchange, wrenches, and their rates.
+struct Bent {
+    impulses: DVector<f64>,
+    gradient: Vec<Vec6>,
+    rate: Vec<Vec6>,
 }
 
 impl<'a> ScatteredLinearised<'a> {
@@ -76,6 +83,31 @@ impl<'a> ScatteredLinearised<'a> {
         }
     }
 
+    /// Of one direction's charges with themselves, as bodies are displaced and further `twists` are made, if any.
+    fn bent(
+        &self,
+        places: &Places<Dual64>,
+        charges: &[f64],
+        twists: Option<&DVector<f64>>,
+    ) -> Bent {
+        let at = &self.at;
+        let seen = at.tangent_potentials(places, charges);
+        // Charges that the twists ask for, and those that answer the displacement, in one solve.
+        let rates = match twists {
+            Some(twists) => at.answering_beside(twists, &seen),
+            None => at.answering(&seen),
+        };
+        let found = at.gradient_jvp(places, charges, &rates);
+        let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
+        let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
+        let [gradient, rate] = found.wrenches_and_rates().map(scaled);
+        Bent {
+            impulses: at.impulses_of(&seen),
+            gradient,
+            rate,
+        }
+    }
+
     /// The rate of the impulses to charges as bodies are displaced.
     fn impulse_rate(&self, charges: &[f64], z: &[Vec6]) -> DVector<f64> {
         let at = &self.at;
@@ -86,13 +118,6 @@ impl<'a> ScatteredLinearised<'a> {
         seen.iter_mut().zip(further).for_each(|(x, y)| *x += y);
         at.impulses_of(&seen)
     }
-}
-
-/// Rates of the impulses, wrenches and their rates, of one direction's charges with themselves.
-struct Bent {
-    impulses: DVector<f64>,
-    gradient: Vec<Vec6>,
-    rate: Vec<Vec6>,
 }
 
 impl Linearised for ScatteredLinearised<'_> {
@@ -136,43 +161,26 @@ impl Linearised for ScatteredLinearised<'_> {
     ) -> Result<Option<Carried>> {
         let at = &self.at;
         let answer = self.respond(&Direction::Basis(x));
-        let places = at.moving(z);
-        // Charges that the twists ask for, and those that answer the displacement, in one solve.
-        let seen = at.tangent_potentials(&places, &answer.charges);
-        let rates = at.answering_beside(twists, &seen);
-        let found = at.gradient_jvp(&places, &answer.charges, &rates);
-        let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
-        let mut momentum = at.impulses_of(&seen);
-        at.add_own(twists, &mut momentum);
-        let [gradient, rate] = found.wrenches_and_rates();
+        let Bent {
+            mut impulses,
+            gradient,
+            rate,
+        } = self.bent(&at.moving(z), &answer.charges, Some(twists));
+        at.add_own(twists, &mut impulses);
         at.check()?;
-        let scaled = |w: Vec<Vec6>, by: f64| w.into_iter().map(|w| by * w).collect();
         Ok(Some(Carried {
-            momentum,
-            wrench: scaled(rate, FLUX),
-            gradient: scaled(gradient, 2.0 * FLUX),
+            momentum: impulses,
+            wrench: rate.into_iter().map(|w| 0.5 * w).collect(),
+            gradient,
         }))
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
         let at = &self.at;
         let places = at.moving(z);
-        let bent = |charges: &[f64]| {
-            let seen = at.tangent_potentials(&places, charges);
-            let rates = at.answering(&seen);
-            let found = at.gradient_jvp(&places, charges, &rates);
-            let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
-            let [gradient, rate] = found.wrenches_and_rates();
-            let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
-            Bent {
-                impulses: at.impulses_of(&seen),
-                gradient: scaled(gradient),
-                rate: scaled(rate),
-            }
-        };
         let (x, y) = (self.respond(&x), self.respond(&y));
         let out = if x.charges == y.charges {
-            let bent = bent(&x.charges);
+            let bent = self.bent(&places, &x.charges, None);
             Tangent {
                 momentum_x: bent.impulses.clone(),
                 momentum_y: bent.impulses,
@@ -180,19 +188,13 @@ impl Linearised for ScatteredLinearised<'_> {
                 wrench: bent.rate,
             }
         } else {
-            let combined = |sign: f64| -> Vec<f64> {
-                let each = x.charges.iter().zip(&y.charges);
-                each.map(|(x, y)| x + sign * y).collect()
-            };
-            let (sum, difference) = (bent(&combined(1.0)), bent(&combined(-1.0)));
-            let quarter = |a: &[Vec6], b: &[Vec6]| -> Vec<Vec6> {
-                a.iter().zip(b).map(|(a, b)| 0.25 * (a - b)).collect()
-            };
+            let [sum, difference] = [1.0, -1.0]
+                .map(|sign| self.bent(&places, &plus(&x.charges, sign, &y.charges), None));
             Tangent {
                 momentum_x: 0.5 * (&sum.impulses + &difference.impulses),
                 momentum_y: 0.5 * (&sum.impulses - &difference.impulses),
-                gradient: quarter(&sum.gradient, &difference.gradient),
-                wrench: quarter(&sum.rate, &difference.rate),
+                gradient: mixed(&sum.gradient, &difference.gradient),
+                wrench: mixed(&sum.rate, &difference.rate),
             }
         };
         at.check()?;

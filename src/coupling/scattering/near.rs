@@ -46,19 +46,14 @@ pub(super) struct Charged<'m, T> {
 
 impl<T: Number> Charged<'_, T> {
     /// What the points of some pairs see of each other, with the forces on them and energies if these are asked for.
-    pub fn part(
-        &self,
-        pairs: &[(usize, Near)],
-        forces: bool,
-        known: Option<&Distances>,
-    ) -> NearPart<T> {
+    pub fn part(&self, pairs: &[Near], forces: bool, known: Option<&Distances>) -> NearPart<T> {
         multipole::vectorized(
             #[inline(always)]
             || {
                 let mut out = NearPart::zeros(self.charges.len(), forces);
                 let mut other = Vec::new();
-                for (number, near) in pairs {
-                    if let Some(inverse) = known.and_then(|known| known.of(*number)) {
+                for near in pairs {
+                    if let Some(inverse) = known.and_then(|known| known.of(near.number)) {
                         self.known_pair(near, inverse, &mut out.potentials);
                         continue;
                     }

@@ -30,6 +30,8 @@ pub(super) struct Far {
 pub(super) struct Near {
     pub bodies: [usize; 2],
     pub within: Option<usize>,
+    /// Its place in the list.
+    pub number: usize,
 }
 
 /// All pairs at some poses.
@@ -85,16 +87,15 @@ impl Pairs {
                 });
             }
             // By numbers of bodies, which don't change: what is chosen by size would change suddenly.
-            match (left.halves, right.halves) {
-                (Some([l, r]), _) if left.count >= right.count => {
-                    waiting.extend([([r, b], deeper), ([l, b], deeper)]);
-                }
-                (_, Some([l, r])) => waiting.extend([([a, r], deeper), ([a, l], deeper)]),
-                (Some([l, r]), None) => waiting.extend([([r, b], deeper), ([l, b], deeper)]),
-                (None, None) if hold => {}
-                (None, None) => out.near.push(Near {
+            let first = left.count >= right.count;
+            match if first { left.halves } else { right.halves } {
+                Some([l, r]) if first => waiting.extend([([r, b], deeper), ([l, b], deeper)]),
+                Some([l, r]) => waiting.extend([([a, r], deeper), ([a, l], deeper)]),
+                None if hold => {}
+                None => out.near.push(Near {
                     bodies: [cells.bodies(a)[0], cells.bodies(b)[0]],
                     within: deeper,
+                    number: out.near.len(),
                 }),
             }
         }

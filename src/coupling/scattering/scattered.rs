@@ -7,14 +7,14 @@ use super::places::Places;
 use super::sums::{Gradient, Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::coupling::CouplingReport;
+use crate::coupling::reduced::FLUX;
+use crate::coupling::settings::met;
 use crate::solver::{Columns, gmres};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use num_dual::Dual64;
-use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-const FLUX: f64 = 4.0 * PI;
 const ITERATIONS: usize = 300;
 const RESTART: usize = 60;
 /// Answers kept: those to the velocity, to a virtual one and to what is driven, at both ends of a pair.
@@ -237,8 +237,7 @@ impl Scattered<'_> {
         let mut kept = self.kept();
         kept.report.iterations = kept.report.iterations.max(found.iterations);
         kept.report.residual = kept.report.residual.max(found.residual);
-        let met = found.residual <= 1.001 * tolerance.max(1e-13);
-        if !met && kept.failed.is_none() {
+        if !met(found.residual, tolerance) && kept.failed.is_none() {
             kept.failed = Some((found.iterations, found.residual));
         }
         found.x.data
@@ -258,18 +257,13 @@ impl Scattered<'_> {
         }
         let none = vec![0.0; self.model.mode_count()];
         let own = self.charges(twists, &none);
-        let modes = self.scattered(&self.sums().potentials(&own));
-        self.keep(self.answer(twists, &modes))
-    }
-
-    fn answer(&self, twists: &DVector<f64>, modes: &[f64]) -> Answer {
-        let charges = self.charges(twists, modes);
-        let (_, exchanged) = self.projected(&self.sums().potentials(&charges));
-        Answer {
+        let modes = self.scattered(&self.potentials(&own));
+        let charges = self.charges(twists, &modes);
+        self.keep(Answer {
+            exchanged: self.impulses_of(&self.potentials(&charges)),
             twists: twists.clone(),
             charges,
-            exchanged,
-        }
+        })
     }
 
     fn keep(&self, answer: Answer) -> Arc<Answer> {
@@ -334,16 +328,8 @@ impl Scattered<'_> {
         if x == y {
             return self.gradient(x);
         }
-        let combined = |sign: f64| -> Vec<f64> {
-            let each = x.iter().zip(y);
-            each.map(|(x, y)| x + sign * y).collect()
-        };
-        let (sum, difference) = (
-            self.gradient(&combined(1.0)),
-            self.gradient(&combined(-1.0)),
-        );
-        let each = sum.iter().zip(&difference);
-        each.map(|(s, d)| 0.25 * (s - d)).collect()
+        let [sum, difference] = [1.0, -1.0].map(|sign| self.gradient(&plus(x, sign, y)));
+        mixed(&sum, &difference)
     }
 
     /// The places as the bodies are displaced.
@@ -411,4 +397,16 @@ impl Scattered<'_> {
             rows += own * twist;
         }
     }
+}
+
+/// x + `sign` y.
+pub(super) fn plus(x: &[f64], sign: f64, y: &[f64]) -> Vec<f64> {
+    let each = x.iter().zip(y);
+    each.map(|(x, y)| x + sign * y).collect()
+}
+
+/// Of a quadratic form's values at x + y and at x − y its bilinear one's at x and y.
+pub(super) fn mixed(sum: &[Vec6], difference: &[Vec6]) -> Vec<Vec6> {
+    let each = sum.iter().zip(difference);
+    each.map(|(s, d)| 0.25 * (s - d)).collect()
 }

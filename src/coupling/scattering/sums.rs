@@ -187,9 +187,8 @@ impl<'s, T: Number> Sums<'s, T> {
         };
         // Forces need the way as well.
         let known = self.known.filter(|_| !forces);
-        let numbered: Vec<(usize, Near)> = self.pairs.near.iter().copied().enumerate().collect();
-        let part = |pairs: &[(usize, Near)]| charged.part(pairs, forces, known);
-        let parts = in_parts(&numbered, part);
+        let part = |pairs: &[Near]| charged.part(pairs, forces, known);
+        let parts = in_parts(&self.pairs.near, part);
         let mut out = NearPart::zeros(charges.len(), forces);
         parts.into_iter().for_each(|part| out.add(part));
         out

@@ -7,6 +7,7 @@ use crate::Result;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::CouplingReport;
 use crate::coupling::reduced::ReducedBody;
+use crate::gpu::lanczos;
 use crate::gpu::units::{Twists, placements};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
@@ -187,26 +188,12 @@ pub(super) fn impulses(
     out
 }
 
-/// Condition number from the probe's coefficients, from below: extreme eigenvalues of the tridiagonal matrix that conjugate
-/// gradients make (Golub and Van Loan, Matrix Computations, 10.2). `None` of one that isn't positive definite.
+/// Condition number from the probe's coefficients, from below. `None` of a system that isn't positive definite.
 fn condition(history: &[f64]) -> Option<f64> {
     let steps = history[0] as usize;
-    let alpha = |j: usize| history[1 + 2 * j];
-    let beta = |j: usize| history[2 + 2 * j];
-    if steps == 0 {
-        return Some(1.0);
+    let (alpha, beta) = (|j: usize| history[1 + 2 * j], |j: usize| history[2 + 2 * j]);
+    match lanczos::extremes(steps, alpha, beta) {
+        None => Some(1.0),
+        Some([low, high]) => (low > 0.0 && high.is_finite()).then(|| high / low),
     }
-    let mut lanczos = DMatrix::zeros(steps, steps);
-    for j in 0..steps {
-        lanczos[(j, j)] = 1.0 / alpha(j);
-        if j > 0 {
-            lanczos[(j, j)] += beta(j - 1) / alpha(j - 1);
-            let beside = beta(j - 1).max(0.0).sqrt() / alpha(j - 1);
-            lanczos[(j, j - 1)] = beside;
-            lanczos[(j - 1, j)] = beside;
-        }
-    }
-    let eigenvalues = lanczos.symmetric_eigenvalues();
-    let (low, high) = (eigenvalues.min(), eigenvalues.max());
-    (low > 0.0 && high.is_finite()).then(|| high / low)
 }

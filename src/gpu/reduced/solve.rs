@@ -4,9 +4,9 @@ use super::products::{Blocks, Part, Product, product};
 use crate::gpu::buffer::{Buffer, words};
 use crate::gpu::columns::Base;
 use crate::gpu::kernel::{Call, threads};
+use crate::gpu::lanczos;
 use crate::gpu::points::PlacedPoints;
 use crate::{Error, Result};
-use nalgebra::DMatrix;
 
 /// Iterations that are started before the host first looks.
 const FEW: usize = 12;
@@ -243,26 +243,10 @@ impl<'a> Solve<'a> {
         let fine = model.context.fine();
         let steps = (words(&bytes[0])[4 * probe] as usize).min(MOST);
         let history = fine.numbers(&bytes[2]);
-        let (alpha, beta) = (|j: usize| history[2 * j], |j: usize| history[2 * j + 1]);
-        let mut lanczos = DMatrix::zeros(steps, steps);
-        for j in 0..steps {
-            lanczos[(j, j)] = 1.0 / alpha(j);
-            if j > 0 {
-                lanczos[(j, j)] += beta(j - 1) / alpha(j - 1);
-                let beside = beta(j - 1).max(0.0).sqrt() / alpha(j - 1);
-                lanczos[(j, j - 1)] = beside;
-                lanczos[(j - 1, j)] = beside;
-            }
-        }
-        if steps == 0 {
-            return Ok(1.0);
-        }
-        let eigenvalues = lanczos.symmetric_eigenvalues();
-        let (low, high) = (eigenvalues.min(), eigenvalues.max());
-        if low > 0.0 {
-            Ok(high / low)
-        } else {
-            Err(model.reduced.indefinite(&self.placed.poses, low))
+        match lanczos::extremes(steps, |j| history[2 * j], |j| history[2 * j + 1]) {
+            None => Ok(1.0),
+            Some([low, high]) if low > 0.0 => Ok(high / low),
+            Some([low, _]) => Err(model.reduced.indefinite(&self.placed.poses, low)),
         }
     }
 }

@@ -27,23 +27,27 @@ pub(super) struct Sums<'s, T> {
 }
 
 /// The energy's gradient: in the charges the potentials that they see, and in the bodies' places spatial wrenches.
-pub(super) struct Gradient<T> {
+pub(super) struct Gradient<'s, T> {
+    model: &'s Scattering,
     pub potentials: Vec<T>,
+    /// On all that is seen.
     wrenches: Vec<[T; 6]>,
 }
 
-impl Gradient<f64> {
+impl Gradient<'_, f64> {
     pub fn wrenches(&self) -> Vec<Vec6> {
-        self.wrenches.iter().map(|w| Vec6::from(*w)).collect()
+        let all = self.wrenches.iter().map(|w| Vec6::from(*w));
+        self.model.gathered_wrenches(all.collect())
     }
 }
 
-impl Gradient<Dual64> {
+impl Gradient<'_, Dual64> {
     /// The wrenches, and their rates.
     pub fn wrenches_and_rates(&self) -> [Vec<Vec6>; 2] {
         let of = |part: fn(&Dual64) -> f64| {
-            let each = self.wrenches.iter();
-            each.map(|w| Vec6::from_fn(|i, _| part(&w[i]))).collect()
+            let all = self.wrenches.iter();
+            let all = all.map(|w| Vec6::from_fn(|i, _| part(&w[i])));
+            self.model.gathered_wrenches(all.collect())
         };
         [of(|x| x.re), of(|x| x.eps)]
     }
@@ -100,7 +104,7 @@ impl<'s, T: Number> Sums<'s, T> {
 
     /// `each` of every body with room for its part of `out`, `n` numbers a body.
     fn of_bodies<X: Send>(&self, out: &mut [X], n: usize, each: impl Fn(usize, &mut [X]) + Sync) {
-        match self.model.bodies.len() < FEW {
+        match self.model.points.len() < FEW {
             true => out.chunks_mut(n).enumerate().for_each(|(b, x)| each(b, x)),
             false => (out.par_chunks_mut(n).enumerate()).for_each(|(b, x)| each(b, x)),
         }
@@ -111,7 +115,7 @@ impl<'s, T: Number> Sums<'s, T> {
         let (table, cells) = (&self.model.table, &self.model.cells);
         let n = table.moments();
         let zero = T::constant(0.0);
-        let mut of_bodies = vec![zero; n * self.model.bodies.len()];
+        let mut of_bodies = vec![zero; n * self.model.points.len()];
         self.of_bodies(&mut of_bodies, n, |b, out| {
             multipole::vectorized(
                 #[inline(always)]
@@ -222,7 +226,7 @@ impl<'s, T: Number> Sums<'s, T> {
                 },
             )
         };
-        let bodies = 0..self.model.bodies.len();
+        let bodies = 0..self.model.points.len();
         let all: Vec<Vec<[T; 4]>> = match bodies.len() < FEW {
             true => bodies.map(one).collect(),
             false => bodies.into_par_iter().map(one).collect(),
@@ -232,16 +236,18 @@ impl<'s, T: Number> Sums<'s, T> {
 
     /// G α: the potential at each point that the other bodies' charges make.
     pub fn potentials(&self, charges: &[T]) -> Vec<T> {
+        let charges = &*self.model.spread(charges);
         let (locals, _) = self.locals(&self.moments(charges), false);
         let mut out = self.near(charges, false).potentials;
         for (out, [seen, ..]) in out.iter_mut().zip(self.seen_afar(&locals, false)) {
             *out += seen;
         }
-        out
+        self.model.gathered(out)
     }
 
     /// The gradient of ½ αᵀ G α.
-    pub fn gradient(&self, charges: &[T]) -> Gradient<T> {
+    pub fn gradient(&self, charges: &[T]) -> Gradient<'s, T> {
+        let charges = &*self.model.spread(charges);
         let (table, cells) = (&self.model.table, &self.model.cells);
         let n = table.moments();
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
@@ -290,8 +296,9 @@ impl<'s, T: Number> Sums<'s, T> {
             *out += *seen;
         }
         Gradient {
+            model: self.model,
             wrenches,
-            potentials: near.potentials,
+            potentials: self.model.gathered(near.potentials),
         }
     }
 

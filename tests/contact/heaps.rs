@@ -121,7 +121,7 @@ fn sparse_gradients_hold() {
 #[test]
 fn products_are_as_the_factor() {
     for integrator in CONTACT_INTEGRATORS {
-        let scene = thrown(16);
+        let scene = thrown(6);
         let make = |exchange| {
             let settings = Settings::default()
                 .fidelity(Fidelity::Reduced)

@@ -331,10 +331,10 @@ fn walls_mirror_bodies_as_the_factor_does() {
 /// Integrators that solve their stages: products as the factor, beside a wall and in a current, and gradients against differences.
 #[test]
 fn implicit_integrators_agree_and_have_gradients() {
-    let mut scene = swarm(8, 0.5, 1300.0);
+    let mut scene = swarm(5, 0.5, 1300.0);
     scene.fluid.current = [0.1, 0.05, 0.0];
     scene.add_wall([0.0, 0.0, -0.17], [0.0, 0.0, 1.0]);
-    let steps = 3;
+    let steps = 2;
     for integrator in [
         Integrator::MomentumEuler,
         Integrator::EnergyEuler,
@@ -357,28 +357,21 @@ fn implicit_integrators_agree_and_have_gradients() {
         let gradient = products.gradient(&loss).unwrap().initial;
         let along = DVector::from_fn(last.len(), |_, _| 0.5 * drawn.number());
         let start = products.simulator();
-        let value = |h: f64, by_q: bool| {
+        // Where and how fast they start at once.
+        let value = |h: f64| {
             let mut moved = start.clone();
             let (q, v) = moved.start();
-            let (mut q, mut v) = (q.clone(), v.clone());
-            match by_q {
-                true => q = start.system().tree.integrate(&q, &(0.01 * h * &along)),
-                false => v += h * &along,
-            }
+            let q = start.system().tree.integrate(q, &(0.01 * h * &along));
+            let v = v + h * &along;
             moved.set_start(q, v).unwrap();
             let rollout = moved.rollout(&Controls::zeros(&moved, steps)).unwrap();
             weights.dot(&rollout.samples()[steps].v)
         };
-        let mut worst = 0.0_f64;
-        for (by_q, told) in [
-            (false, gradient.v.dot(&along)),
-            (true, 0.01 * gradient.q.dot(&along)),
-        ] {
-            let h = 1e-3;
-            let sum = |h: f64| value(h, by_q) - value(-h, by_q);
-            let by = (8.0 * sum(h) - sum(2.0 * h)) / (12.0 * h);
-            worst = worst.max((told - by).abs() / by.abs());
-        }
+        let told = (&gradient.v + 0.01 * &gradient.q).dot(&along);
+        let h = 1e-3;
+        let sides = |h: f64| value(h) - value(-h);
+        let by = (8.0 * sides(h) - sides(2.0 * h)) / (12.0 * h);
+        let worst = (told - by).abs() / by.abs();
         println!(
             "{integrator:?}: accelerations differ by {error:.1e}, gradients from differences by {worst:.1e}"
         );

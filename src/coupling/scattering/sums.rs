@@ -138,12 +138,12 @@ impl<'s, T: Number> Sums<'s, T> {
         for (own, leaf) in of_bodies.chunks_exact(n).zip(&cells.leaf) {
             out[n * leaf..][..n].copy_from_slice(own);
         }
-        let mut powers = vec![zero; n];
+        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
         for i in (1..cells.cells.len()).rev() {
             self.shift(i, &mut powers);
             let (above, own) = out.split_at_mut(n * i);
-            let parent = n * cells.cells[i].parent;
-            multipole::shift(table, &powers, &own[..n], &mut above[parent..parent + n]);
+            let above = &mut above[n * cells.cells[i].parent..][..n];
+            multipole::shift(table, &powers, &own[..n], above, &mut room);
         }
         out
     }
@@ -173,11 +173,12 @@ impl<'s, T: Number> Sums<'s, T> {
             worth.extend(part.slopes);
         }
         let mut powers = vec![T::constant(0.0); n];
+        let mut room = vec![T::constant(0.0); table.derivatives()];
         for (i, cell) in cells.iter().enumerate().skip(1) {
             self.shift(i, &mut powers);
             let (above, own) = out.split_at_mut(n * i);
             let bar = &above[n * cell.parent..][..n];
-            multipole::shift_back(table, &powers, bar, &mut own[..n]);
+            multipole::shift_back(table, &powers, bar, &mut own[..n], &mut room);
         }
         (out, worth)
     }
@@ -258,11 +259,11 @@ impl<'s, T: Number> Sums<'s, T> {
         let mut radii = vec![zero; cells.cells.len()];
         far::pull(&self.pairs.far, &worth, &self.weights, &mut centres);
         self.blends(&worth, &near.energies, &mut centres, &mut radii);
-        let mut powers = vec![zero; n];
+        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
         for (i, cell) in cells.cells.iter().enumerate().skip(1) {
             self.shift(i, &mut powers);
             let (own, bar) = (&moments[n * i..][..n], &locals[n * cell.parent..][..n]);
-            let slope = multipole::shift_gradient(table, &powers, own, bar);
+            let slope = multipole::shift_gradient(table, &powers, own, bar, &mut room);
             add(&mut centres[i], one, &slope);
             add(&mut centres[cell.parent], -one, &slope);
         }

@@ -1,5 +1,7 @@
 """A browser without a screen, and the pictures that it takes."""
 
+import contextlib
+import importlib
 import os
 import pathlib
 import re
@@ -62,6 +64,24 @@ def picture(file: pathlib.Path, after: str = "", clock: int = 3000) -> np.ndarra
     png = file.with_suffix(".png")
     _run(file, after, f"--screenshot={png}", clock=clock)
     return pixels(png.read_bytes())
+
+
+@contextlib.contextmanager
+def opened(file: pathlib.Path):
+    """The page, as Playwright drives it: by the clock of the world, for what has to be waited for."""
+    program = find()
+    if os.environ.get("HYDROGRAD_REQUIRE_BROWSER") != "1":
+        pytest.importorskip("playwright")
+    api = importlib.import_module("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=program, args=OPTIONS)
+        try:
+            page = chromium.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+            page.set_default_timeout(180_000)
+            page.goto(file.as_uri())
+            yield page
+        finally:
+            chromium.close()
 
 
 def pixels(png: bytes) -> np.ndarray:

@@ -5,7 +5,6 @@ import html
 import json
 import os
 import pathlib
-import re
 import subprocess
 import sys
 import webbrowser
@@ -659,39 +658,46 @@ def test_a_picture_of_pressure(stirring, tmp_path):
     assert min(seen[0]) > 100 and max(seen[1]) < 0.2 * min(seen[0]), seen
 
 
-BESIDE = """
-    const found = {};
-    const pictures = async (n) => { for (let i = 0; i < n; i++) await new Promise(requestAnimationFrame); };
-    const until = async (holds) => { for (let i = 0; i < PATIENCE && !holds(); i++) await pictures(1); };
-    const { player, stage } = hydrograd;
-    (async () => {
-      await pictures(5);
-      found.range = [player.first, player.last];
-      MINE
-      found.time = player.time;
-      found.playing = player.playing;
-      found.led = player.led;
-      found.frame = player.frame;
-      found.camera = stage.camera.position.toArray();
-      found.speed = document.getElementById("speed").value;
-      document.title = found.title = JSON.stringify(found);
-      window.parent.postMessage({ found }, "*");
-    })();
+UNTIL = """
+    const begun = performance.now();
+    const until = async (holds) => {
+      while (!holds()) {
+        if (performance.now() > begun + 180000) throw new Error(`${holds} never came`);
+        await new Promise(requestAnimationFrame);
+      }
+    };
+    const { player, stage, link } = hydrograd;
 """
-ACTS = """
+ACTS = """async () => {
+    UNTIL
+    // The page around has said where to begin.
+    await until(() => link.lead > 0);
     player.seek(0.3); stage.look(new THREE.Vector3(1, 0, 0));
-    const speed = document.getElementById("speed");
+    const speed = document.getElementById("speed"), loop = document.getElementById("loop");
     speed.value = "0.1"; speed.dispatchEvent(new Event("change"));
+    // It goes on until it is stopped.
+    loop.checked = true; loop.dispatchEvent(new Event("change"));
     document.getElementById("play").click();
-    await until(() => !player.playing);
-"""
-STOPS = """
-    await until(() => player.playing && player.time > 0.3);
-    found.before = player.time;
-    found.went = player.playing && player.led;
+    await until(() => player.playing);
+}""".replace("UNTIL", UNTIL)
+# What the clock said last is said once more after the press, as where it was on its way.
+STOPS = """async () => {
+    UNTIL
+    let last = null;
+    window.addEventListener("message", ({ data }) => { if (data.state) last = data; });
+    await until(() => player.playing && player.time > 0.3 && last && last.state.playing);
+    const found = { before: player.time, went: player.playing && player.led, led: link.leader !== link.place };
     document.getElementById("play").click();
-    await pictures(5);
-"""
+    window.dispatchEvent(new MessageEvent("message", { data: last, source: window.parent }));
+    await until(() => link.leader === link.place);
+    return found;
+}""".replace("UNTIL", UNTIL)
+FOUND = """() => {
+    const { player, stage } = hydrograd;
+    const speed = document.getElementById("speed").value, loop = document.getElementById("loop").checked;
+    const { time, playing, first, last } = player;
+    return { range: [first, last], time, playing, speed, loop, camera: stage.camera.position.toArray() };
+}"""
 
 
 def timed(text: str) -> str:
@@ -709,36 +715,22 @@ def test_two_beside_each_other(rollout, tmp_path):
     first, second = (json.loads(Parts(page).scripts[0]) for page in pages)
     assert first["range"] == second["range"] == [0.0, 2.0] and first["center"] == second["center"] and first["size"] == second["size"]
     assert unpacked(first["time"])[-1] == 1.0 and unpacked(second["time"])[-1] == 2.0
-    left, right = _beside(view.html, pages, tmp_path)
+    file = tmp_path / "beside.html"
+    file.write_text(view.html, encoding="utf-8")
+    with browser.opened(file) as around:
+        around.wait_for_selector("body[data-status]")
+        assert around.evaluate("() => document.body.dataset.status") == "drawn"
+        frames = around.frames[1:]
+        frames[0].evaluate(ACTS)
+        stopped = frames[1].evaluate(STOPS)
+        frames[0].wait_for_function("() => !hydrograd.player.playing")
+        left, right = (frame.evaluate(FOUND) for frame in frames)
     assert left["range"] == right["range"] == [0.0, 2.0]
-    assert right["went"] and right["before"] >= 0.3
+    assert stopped["went"] and stopped["led"] and stopped["before"] >= 0.3
     assert not left["playing"] and not right["playing"]
-    assert left["time"] == right["time"] >= right["before"]
+    assert left["time"] == right["time"] >= stopped["before"]
     assert np.allclose(left["camera"], right["camera"], atol=1e-12) and left["camera"][0] > 1.0
-    assert left["speed"] == right["speed"] == "0.1"
-
-
-def _beside(text, pages, folder):
-    """What each of two pages finds after one or the other was pressed. The browser's clock runs ahead of a busy machine's pictures: who wasn't done by its end gets four times as long, once."""
-    collect = """const all = []; window.addEventListener("message", ({ source, data }) => {
-      if (!data.found) return;
-      all[[...document.querySelectorAll("iframe")].findIndex((f) => f.contentWindow === source)] = data.found;
-      document.title = JSON.stringify(all);
-    });"""
-    text = text.replace("<script>", f"<script>{collect}</script><script>", 1)
-    for clock in (24000, 96000):
-        told = text
-        for page, mine in zip(pages, (ACTS, STOPS), strict=True):
-            script = BESIDE.replace("MINE", mine).replace("PATIENCE", str(clock // 20))
-            told = told.replace(html.escape(page), html.escape(page.replace("</body>", f"<script>{script}</script></body>")))
-        file = folder / f"beside{clock}.html"
-        file.write_text(timed(told), encoding="utf-8")
-        says, after = browser.body(file, "", clock=clock)
-        assert says["status"] == "drawn"
-        found = re.fullmatch(r"\[\{.*\},\{.*\}\]", Parts(after).title)
-        if found and all(part.get("went", True) for part in json.loads(found[0])):
-            break
-    return json.loads(Parts(after).title)
+    assert left["speed"] == right["speed"] == "0.1" and left["loop"] and right["loop"]
 
 
 def test_beside_each_other_at_a_moment(rollout, tmp_path):

@@ -44,6 +44,8 @@ hydrograd.Link = class {
   /** Goes where the page around says and leads from there, or does as another did. */
   take({ go, state, lead, from }) {
     const { player, stage } = this;
+    // What was done here since the last picture comes first: told, it leads, and what the one before still says is passed over.
+    if (state) this.tell();
     if (go) {
       player.jump(go);
       this.acts = true;

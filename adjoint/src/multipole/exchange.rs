@@ -3,10 +3,10 @@
 //! With moments `Mᵏ = Σ α aᵏ/k!` of one cloud about its centre, Nˡ of another, and R from the other's centre to the first's,
 //!
 //! ```text
-//! Σᵢⱼ αᵢ βⱼ / |xᵢ − yⱼ| = Σ_{|k|+|l| ≤ p} Mᵏ (−1)^|l| Nˡ ∂ᵏ⁺ˡ (1/R)
+//! Σᵢⱼ αᵢ βⱼ / |xᵢ − yⱼ| = Σ_{|k|, |l| ≥ 1, |k|+|l| ≤ p} Mᵏ (−1)^|l| Nˡ ∂ᵏ⁺ˡ (1/R)
 //! ```
 //!
-//! up to terms of the degree p + 1 in (size of the clouds)/R. The sum over whole degrees turns and moves with the clouds. As 1/R is harmonic, moments with z above
+//! for clouds whose charges add up to nothing, up to terms of the degree p + 1 in (size of the clouds)/R. The sum over whole degrees turns and moves with the clouds. As 1/R is harmonic, moments with z above
 //! one are told by others ([`Table`]).
 
 use super::{Arithmetic, Table};
@@ -18,7 +18,7 @@ pub fn derivatives<T: Arithmetic>(table: &Table, r: &[T; 3], one_more: bool, out
     let inverse = square.inverse();
     out[0] = inverse.root();
     let degree = table.degree() + usize::from(one_more);
-    for n in 1..(degree + 1) * (degree + 1) {
+    for (n, at) in table.derived(one_more).skip(1) {
         let mut sum = T::constant(0.0);
         for lower in table.once.of(n) {
             sum += out[lower.at] * (r[lower.axis] * lower.factor);
@@ -26,7 +26,7 @@ pub fn derivatives<T: Arithmetic>(table: &Table, r: &[T; 3], one_more: bool, out
         for lower in table.twice.of(n) {
             sum += out[lower.at] * lower.factor;
         }
-        out[n] = sum * inverse;
+        out[at] = sum * inverse;
     }
     extend(table, degree, out);
 }
@@ -67,7 +67,7 @@ pub fn see<T: Arithmetic>(
     [m, n]: [&[T]; 2],
     [seen_m, seen_n]: [&mut [T]; 2],
 ) {
-    for degree in 0..=table.degree() {
+    for degree in table.degrees() {
         let (range, mut sums) = table.sums(degree);
         let (m, seen_m) = (&m[range.clone()], &mut seen_m[range]);
         // Two at once: what n is and sees is loaded and stored half as often.
@@ -77,7 +77,7 @@ pub fn see<T: Arithmetic>(
                 return;
             };
             let (own, mut sum) = ([m[0] * weight, m[1] * weight], [T::constant(0.0); 2]);
-            let each = n.iter().zip(seen_n.iter_mut());
+            let each = n[1..].iter().zip(&mut seen_n[1..]);
             for ((n, seen), (i, j)) in each.zip(first.iter().zip(second)) {
                 let d = [d[*i as usize], d[*j as usize]];
                 sum[0] += *n * d[0];
@@ -90,7 +90,7 @@ pub fn see<T: Arithmetic>(
         let last = own.remainder().iter().zip(seen.into_remainder());
         for ((m, seen_m), at) in last.zip(sums) {
             let (own, mut sum) = (*m * weight, T::constant(0.0));
-            for ((n, seen), at) in n.iter().zip(seen_n.iter_mut()).zip(at) {
+            for ((n, seen), at) in n[1..].iter().zip(&mut seen_n[1..]).zip(at) {
                 let d = d[*at as usize];
                 sum += *n * d;
                 *seen += own * d;
@@ -109,10 +109,10 @@ pub fn energy<T: Arithmetic>(
     both: &mut [T],
 ) -> (T, [T; 3]) {
     both.fill(T::constant(0.0));
-    for degree in 0..=table.degree() {
+    for degree in table.degrees() {
         let (range, sums) = table.sums(degree);
         for (m, sums) in m[range].iter().zip(sums) {
-            for (n, at) in n.iter().zip(sums) {
+            for (n, at) in n[1..].iter().zip(sums) {
                 both[*at as usize] += *m * *n;
             }
         }

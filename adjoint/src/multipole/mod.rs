@@ -17,7 +17,7 @@ pub use moments::{
 };
 pub use table::{MOST, Table};
 
-pub use number::{Arithmetic, DualPack, Number, Pack, WIDTH};
+pub use number::{Arithmetic, DualPack, Number, Pack, WIDTH, inverse_distances};
 
 /// Runs `op`, all of it inlined, with the widest vectors of this processor. Nothing is contracted: results are the same whatever the width.
 pub fn vectorized<R>(op: impl FnOnce() -> R) -> R {

@@ -16,10 +16,10 @@ pub fn monomials<T: Arithmetic>(table: &Table, a: &[T; 3], out: &mut [T]) {
     }
 }
 
-/// Adds the moments Σ α aᵏ/k! of a charge whose monomials these are.
+/// Adds the moments Σ α aᵏ/k! of a charge whose monomials these are; of the degree 0, which all charges of a cloud add up to nothing in, none.
 #[inline(always)]
 pub fn add_moments<T: Arithmetic>(monomials: &[T], charge: T, out: &mut [T]) {
-    for (out, m) in out.iter_mut().zip(monomials) {
+    for (out, m) in out.iter_mut().zip(monomials).skip(1) {
         *out += *m * charge;
     }
 }
@@ -55,15 +55,15 @@ pub fn shift<T: Arithmetic>(
 ) {
     // M'ₖ₊ₗ += Mₖ sˡ/l!
     room.fill(T::constant(0.0));
-    for degree in 0..=table.degree() {
-        let (range, sums) = table.sums(degree);
+    for degree in table.degrees() {
+        let (range, sums) = table.shifts(degree);
         for (m, sums) in from[range].iter().zip(sums) {
             for (s, at) in monomials.iter().zip(sums) {
                 room[*at as usize] += *m * *s;
             }
         }
     }
-    fold(table, table.degree(), room);
+    fold(table, table.degree() - 1, room);
     for (out, x) in out.iter_mut().zip(room) {
         *out += *x;
     }
@@ -79,9 +79,9 @@ pub fn shift_back<T: Arithmetic>(
     room: &mut [T],
 ) {
     room[..bar.len()].copy_from_slice(bar);
-    extend(table, table.degree(), room);
-    for degree in 0..=table.degree() {
-        let (range, sums) = table.sums(degree);
+    extend(table, table.degree() - 1, room);
+    for degree in table.degrees() {
+        let (range, sums) = table.shifts(degree);
         for (out, sums) in out[range].iter_mut().zip(sums) {
             let mut sum = *out;
             for (s, at) in monomials.iter().zip(sums) {
@@ -102,11 +102,11 @@ pub fn shift_gradient<T: Arithmetic>(
     room: &mut [T],
 ) -> [T; 3] {
     room[..bar.len()].copy_from_slice(bar);
-    extend(table, table.degree(), room);
+    extend(table, table.degree() - 1, room);
     // The product is Σₗ cₗ sˡ/l!.
     let mut local = vec![T::constant(0.0); from.len()];
-    for degree in 0..=table.degree() {
-        let (range, sums) = table.sums(degree);
+    for degree in table.degrees() {
+        let (range, sums) = table.shifts(degree);
         for (m, sums) in from[range].iter().zip(sums) {
             for (c, at) in local.iter_mut().zip(sums) {
                 *c += *m * room[*at as usize];

@@ -49,7 +49,7 @@ pub trait Arithmetic:
 /// A number of its own.
 pub trait Number: Arithmetic + PartialEq + Send + Sync {
     /// Several side by side.
-    type Pack: Arithmetic;
+    type Pack: Arithmetic + Send + Sync;
     /// From the first of a list on, the last of them again where there are fewer.
     fn pack(from: &[Self]) -> Self::Pack;
     /// One of several.
@@ -60,10 +60,6 @@ pub trait Number: Arithmetic + PartialEq + Send + Sync {
     fn value(self) -> f64;
     /// xⁿ.
     fn power(self, n: i32) -> Self;
-    /// The inverse distances of a point from others, given by their coordinates, if these numbers have loops of their own for them.
-    fn inverse_distances(_from: &[Self; 3], _to: [&[Self]; 3], _out: &mut [Self]) -> bool {
-        false
-    }
 }
 
 /// Plain numbers side by side.
@@ -121,21 +117,22 @@ impl Number for f64 {
     fn power(self, n: i32) -> f64 {
         self.powi(n)
     }
-    #[inline(always)]
-    fn inverse_distances(from: &[f64; 3], [x, y, z]: [&[f64]; 3], out: &mut [f64]) -> bool {
-        for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
-            let way = [from[0] - x, from[1] - y, from[2] - z];
-            *out = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
-        }
-        let mut outside = 0;
-        for x in out.iter() {
-            outside |= u32::from(!usable(*x as f32));
-        }
-        match outside {
-            0 => out.iter_mut().for_each(|x| *x = by_newton(*x)),
-            _ => out.iter_mut().for_each(|x| *x = 1.0 / x.sqrt()),
-        }
-        true
+}
+
+/// The inverse distances of a point from others, which are given by their coordinates.
+#[inline(always)]
+pub fn inverse_distances(from: &[f64; 3], [x, y, z]: [&[f64]; 3], out: &mut [f64]) {
+    for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
+        let way = [from[0] - x, from[1] - y, from[2] - z];
+        *out = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+    }
+    let mut outside = 0;
+    for x in out.iter() {
+        outside |= u32::from(!usable(*x as f32));
+    }
+    match outside {
+        0 => out.iter_mut().for_each(|x| *x = by_newton(*x)),
+        _ => out.iter_mut().for_each(|x| *x = 1.0 / x.sqrt()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Far pairs of cells, eight side by side.
 
 use super::pairs::{Far, Weights};
+use super::parts::in_parts;
 use super::places::{Places, Triple, add, minus};
 use crate::adjoint::multipole::{self, Arithmetic, Number, Table, WIDTH};
 
@@ -21,17 +22,65 @@ pub(super) struct Moments<'m, T> {
     pub signed: &'m [T],
 }
 
+/// Derivatives of 1/r between the cells of far pairs, which a solve asks for again and again, in the parts that these are summed in.
+pub(super) struct Derivatives<T: Number> {
+    parts: Vec<Vec<T::Pack>>,
+}
+
+impl<T: Number> Derivatives<T> {
+    pub fn new(table: &Table, places: &Places<T>, pairs: &[Far]) -> Self {
+        let parts = in_parts(pairs, |_, pairs: &[Far]| {
+            multipole::vectorized(
+                #[inline(always)]
+                || {
+                    let mut d = vec![T::Pack::constant(0.0); table.derivatives()];
+                    let mut out = Vec::new();
+                    for of_one in pairs.chunk_by(|x, y| x.cells[0] == y.cells[0]) {
+                        for pairs in of_one.chunks(WIDTH) {
+                            let way = ways(places, pairs);
+                            multipole::derivatives(table, &way, false, &mut d);
+                            out.extend_from_slice(&d[..table.kept()]);
+                        }
+                    }
+                    out
+                },
+            )
+        });
+        Self { parts }
+    }
+
+    /// Those of a part.
+    pub fn part(&self, number: usize) -> &[T::Pack] {
+        &self.parts[number]
+    }
+}
+
+/// The way from the second cell of each of some pairs to the first, the last pair again where there are fewer than stand side by side.
+#[inline(always)]
+fn ways<T: Number>(places: &Places<T>, pairs: &[Far]) -> [T::Pack; 3] {
+    let mut out = [[T::constant(0.0); WIDTH]; 3];
+    for i in 0..WIDTH {
+        let [a, b] = pairs[i.min(pairs.len() - 1)].cells;
+        let way = minus(&places.centres[a], &places.centres[b]);
+        for (out, x) in out.iter_mut().zip(way) {
+            out[i] = x;
+        }
+    }
+    [T::pack(&out[0]), T::pack(&out[1]), T::pack(&out[2])]
+}
+
 impl<T: Number> Moments<'_, T> {
-    /// What the cells of some pairs see of each other, with energies and their slopes if these are asked for.
-    pub fn part(&self, pairs: &[Far], slopes: bool) -> FarPart<T> {
+    /// What the cells of some pairs see of each other, with energies and their slopes if these are asked for; without slopes, by derivatives that are `known`.
+    pub fn part(&self, pairs: &[Far], slopes: bool, known: Option<&[T::Pack]>) -> FarPart<T> {
         multipole::vectorized(
             #[inline(always)]
-            || self.part_inlined(pairs, slopes),
+            || self.part_inlined(pairs, slopes, known),
         )
     }
 
     #[inline(always)]
-    fn part_inlined(&self, pairs: &[Far], slopes: bool) -> FarPart<T> {
+    fn part_inlined(&self, pairs: &[Far], slopes: bool, known: Option<&[T::Pack]>) -> FarPart<T> {
+        let mut known = known.map(|known| known.chunks_exact(self.table.kept()));
         let (table, n) = (self.table, self.table.moments());
         let zero = T::Pack::constant(0.0);
         let mut out = FarPart {
@@ -59,14 +108,6 @@ impl<T: Number> Moments<'_, T> {
                     *other = pair.cells[1];
                     *weight = self.weights.of(pair);
                 }
-                let mut ways = [[T::constant(0.0); WIDTH]; 3];
-                for (i, b) in others.iter().enumerate() {
-                    let way = minus(&self.places.centres[a], &self.places.centres[*b]);
-                    for (ways, x) in ways.iter_mut().zip(way) {
-                        ways[i] = x;
-                    }
-                }
-                let way = [T::pack(&ways[0]), T::pack(&ways[1]), T::pack(&ways[2])];
                 let rows = others.map(|b| &self.signed[n * b..n * (b + 1)]);
                 for (k, l) in l.iter_mut().enumerate() {
                     let mut column = [T::constant(0.0); WIDTH];
@@ -75,10 +116,17 @@ impl<T: Number> Moments<'_, T> {
                     }
                     *l = T::pack(&column);
                 }
-                multipole::derivatives(table, &way, slopes, &mut d);
+                let d = match known.as_mut().and_then(Iterator::next) {
+                    Some(known) => known,
+                    None => {
+                        let way = ways(self.places, pairs);
+                        multipole::derivatives(table, &way, slopes, &mut d);
+                        &d
+                    }
+                };
                 seen_l.fill(zero);
                 let weight = T::pack(&weights);
-                multipole::see(table, &d, weight, [&*m, &*l], [&mut *seen_m, &mut *seen_l]);
+                multipole::see(table, d, weight, [&*m, &*l], [&mut *seen_m, &mut *seen_l]);
                 for (seen, sign) in seen_l.iter_mut().zip(table.signs()) {
                     *seen = *seen * *sign;
                 }
@@ -89,7 +137,7 @@ impl<T: Number> Moments<'_, T> {
                     }
                 }
                 if slopes {
-                    let (energy, slope) = multipole::energy(table, &d, [&*m, &*l], both);
+                    let (energy, slope) = multipole::energy(table, d, [&*m, &*l], both);
                     for i in 0..pairs.len() {
                         let slope = [
                             T::lane(&slope[0], i),

@@ -112,11 +112,7 @@ impl<'a> ScatteredLinearised<'a> {
     fn impulse_rate(&self, charges: &[f64], z: &[Vec6]) -> DVector<f64> {
         let at = &self.at;
         let places = at.moving(z);
-        let mut seen = at.tangent_potentials(&places, charges);
-        let answered = at.answering(&seen);
-        let further = at.potentials(&answered);
-        seen.iter_mut().zip(further).for_each(|(x, y)| *x += y);
-        at.impulses_of(&seen)
+        at.impulses_answered(&at.tangent_potentials(&places, charges))
     }
 }
 

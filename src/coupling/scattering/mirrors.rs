@@ -21,7 +21,7 @@ impl Scattering {
 
     /// Its transpose: of what charges see.
     pub(super) fn gathered<T: Number>(&self, mut seen: Vec<T>) -> Vec<T> {
-        let own = self.point_count();
+        let own = seen.len() / self.images.len();
         let (bodies, shown) = seen.split_at_mut(own);
         for (k, image) in self.images.iter().enumerate().skip(1) {
             let part = T::constant(0.5 * image.sign);

@@ -20,6 +20,7 @@
 //! Walls and free surfaces are mirror images of the bodies, with trees of their own, that no image but bodies see: with charges c = [α, ½ σ α] on bodies and their images (σ = −1 of those that are
 //! mirrored in free surfaces an odd number of times) the energy is still ½ cᵀĜc, so that all of the above stays true of it.
 
+mod blocks;
 mod cells;
 mod far;
 mod levels;
@@ -27,6 +28,7 @@ mod linearised;
 mod mirrors;
 mod near;
 mod pairs;
+mod parts;
 mod places;
 mod scattered;
 mod sums;
@@ -60,6 +62,8 @@ pub struct Scattering {
     /// Of the bodies, then of all that mirrors show of them, image by image.
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
+    /// Of the few numbers that a body's charges are told by while they are solved for; bodies and what mirrors show.
+    numbers: Vec<Range<usize>>,
     /// Largest distance of a body's points from its centre, m; bodies and what mirrors show.
     sizes: Vec<f64>,
     cells: Cells,
@@ -135,6 +139,7 @@ impl Scattering {
             alone: Isolated::new(bodies.iter().map(|b| b.parts().added_mass).collect()),
             points: ranges(seen().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
+            numbers: ranges(seen().map(|b| b.points().min(b.modes() + 6))),
             sizes: seen().map(size).collect(),
             cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
             table: Table::new(levels.degree),

@@ -1,19 +1,22 @@
 //! Many bodies at some poses: charges and impulses for twists, or for what recoils.
 
 use super::Scattering;
-use super::near::Distances;
+use super::blocks::{Blocks, dot};
 use super::pairs::{Near, Pairs};
+use super::parts::of_each;
 use super::places::{Places, length, minus};
 use super::sums::{Gradient, Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
+use crate::adjoint::multipole;
 use crate::coupling::CouplingReport;
 use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::settings::met;
 use crate::solver::{Columns, gmres};
 use crate::{Error, Result};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 const ITERATIONS: usize = 300;
@@ -55,7 +58,7 @@ pub struct Scattered<'a> {
     pub(super) poses: Vec<Pose>,
     pub(super) pairs: Pairs,
     places: Places<f64>,
-    known: Distances,
+    blocks: Blocks,
     pub(super) motions: Box<dyn Motions + 'a>,
     kept: Mutex<Kept>,
 }
@@ -87,7 +90,7 @@ impl Scattering {
         let places = Places::new(self, poses);
         let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
         Ok(Scattered {
-            known: Distances::new(&pairs.near, &self.points, &places),
+            blocks: Blocks::new(&Sums::new(self, &pairs, &places)),
             pairs,
             places,
             poses: poses.to_vec(),
@@ -167,24 +170,37 @@ impl Scattered<'_> {
     }
 
     fn sums(&self) -> Sums<'_, f64> {
-        Sums::new(self.model, &self.pairs, &self.places).knowing(&self.known)
+        Sums::new(self.model, &self.pairs, &self.places)
     }
 
     /// [L, Ū]ᵀ ψ of every body: of the modes, and of the twists.
     fn projected(&self, potentials: &[f64]) -> (Vec<f64>, DVector<f64>) {
         let model = self.model;
-        let mut modes = vec![0.0; model.mode_count()];
+        self.parted(&model.points, potentials, |_| true)
+    }
+
+    /// What modes and twists see, from what points or numbers do that stand in these ranges.
+    fn parted(
+        &self,
+        ranges: &[Range<usize>],
+        seen: &[f64],
+        points: impl Fn(usize) -> bool + Sync,
+    ) -> (Vec<f64>, DVector<f64>) {
+        let model = self.model;
+        let of_body = |b: usize| {
+            let seen = &seen[ranges[b].clone()];
+            match points(b) {
+                true => products(model.bodies[b].basis(), seen),
+                false => seen.to_vec(),
+            }
+        };
+        let mut modes = Vec::with_capacity(model.mode_count());
         let mut impulses = DVector::zeros(6 * model.bodies.len());
-        for (b, body) in model.bodies.iter().enumerate() {
-            let (own, m) = (&model.modes[b], body.modes());
-            let seen = &potentials[model.points[b].clone()];
-            let columns = body.basis().column_iter();
-            for (k, column) in columns.enumerate() {
-                let sum = column.iter().zip(seen).map(|(l, x)| l * x).sum();
-                match k.checked_sub(m) {
-                    None => modes[own.start + k] = sum,
-                    Some(k) => impulses[6 * b + k] = FLUX * sum,
-                }
+        for (b, found) in of_each(model.bodies.len(), of_body).iter().enumerate() {
+            let (own, moved) = found.split_at(model.bodies[b].modes());
+            modes.extend_from_slice(own);
+            for (k, sum) in moved.iter().enumerate() {
+                impulses[6 * b + k] = FLUX * sum;
             }
         }
         (modes, impulses)
@@ -192,33 +208,46 @@ impl Scattered<'_> {
 
     /// α = Ū x̄ + L a.
     fn charges(&self, twists: &DVector<f64>, modes: &[f64]) -> Vec<f64> {
-        let model = self.model;
-        let mut out = vec![0.0; model.point_count()];
-        for (b, body) in model.bodies.iter().enumerate() {
-            let (own, m) = (&model.modes[b], body.modes());
-            let out = &mut out[model.points[b].clone()];
-            for (k, column) in body.basis().column_iter().enumerate() {
-                let factor = match k.checked_sub(m) {
-                    None => modes[own.start + k],
-                    Some(k) => twists[6 * b + k],
-                };
-                for (out, l) in out.iter_mut().zip(column.iter()) {
-                    *out += factor * l;
-                }
-            }
-        }
-        out
+        self.joined(twists, modes, |_| true)
     }
 
-    /// a = Lᵀ(ψ + Ĝ L a), from what else the points see.
-    fn scattered(&self, potentials: &[f64]) -> Vec<f64> {
-        let (right, _) = self.projected(potentials);
+    /// The charges of some bodies' points, [a, x̄] of others.
+    fn joined(
+        &self,
+        twists: &DVector<f64>,
+        modes: &[f64],
+        points: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<f64> {
+        let model = self.model;
+        let of_body = |b: usize| {
+            let own = &modes[model.modes[b].clone()];
+            let own = [own, &twists.as_slice()[6 * b..6 * b + 6]].concat();
+            match points(b) {
+                true => combined(model.bodies[b].basis(), &own),
+                false => own,
+            }
+        };
+        of_each(model.bodies.len(), of_body).concat()
+    }
+
+    /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other.
+    fn exchanged(
+        &self,
+        sums: &Sums<'_, f64>,
+        twists: &DVector<f64>,
+        modes: &[f64],
+    ) -> (Vec<f64>, DVector<f64>) {
+        let model = self.model;
+        let points = |b: usize| model.numbers[b].len() == model.points[b].len();
+        let numbers = self.joined(twists, modes, points);
+        self.parted(&model.numbers, &self.blocks.seen(sums, &numbers), points)
+    }
+
+    /// a = Lᵀ(ψ + Ĝ L a), from what else the modes see.
+    fn scattered(&self, right: &[f64]) -> Vec<f64> {
         let still = DVector::zeros(6 * self.model.bodies.len());
         let sums = self.sums();
-        self.solve(&right, |a| {
-            let seen = sums.potentials(&self.charges(&still, a));
-            self.projected(&seen).0
-        })
+        self.solve(right, |a| self.exchanged(&sums, &still, a).0)
     }
 
     /// x with x = right + f(x).
@@ -264,14 +293,13 @@ impl Scattered<'_> {
                 twists: twists.clone(),
             });
         }
+        let sums = self.sums();
         let none = vec![0.0; self.model.mode_count()];
-        let own = self.charges(twists, &none);
-        let modes = self.scattered(&self.potentials(&own));
-        let charges = self.charges(twists, &modes);
+        let modes = self.scattered(&self.exchanged(&sums, twists, &none).0);
         self.keep(Answer {
-            exchanged: self.impulses_of(&self.potentials(&charges)),
+            exchanged: self.exchanged(&sums, twists, &modes).1,
+            charges: self.charges(twists, &modes),
             twists: twists.clone(),
-            charges,
         })
     }
 
@@ -300,7 +328,7 @@ impl Scattered<'_> {
         let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
         let seen = |x: &[f64]| {
             let twists = DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
-            self.projected(&sums.potentials(&self.charges(&twists, &modes(x))))
+            self.exchanged(&sums, &twists, &modes(x))
         };
         let next = |(modes, impulses): (Vec<f64>, DVector<f64>)| -> Vec<f64> {
             let twists = recoil(&impulses);
@@ -367,21 +395,24 @@ impl Scattered<'_> {
     /// Charges of these twists that answer further potentials with their own.
     pub(super) fn answering_beside(&self, twists: &DVector<f64>, potentials: &[f64]) -> Vec<f64> {
         let none = vec![0.0; self.model.mode_count()];
-        let own = self.charges(twists, &none);
-        let mut seen = self.sums().potentials(&own);
-        seen.iter_mut().zip(potentials).for_each(|(x, y)| *x += y);
-        self.charges(twists, &self.scattered(&seen))
+        let (mut right, _) = self.exchanged(&self.sums(), twists, &none);
+        let (further, _) = self.projected(potentials);
+        right.iter_mut().zip(further).for_each(|(x, y)| *x += y);
+        self.charges(twists, &self.scattered(&right))
     }
 
-    /// Charges that bodies that stand still answer potentials with: L a, a = Lᵀ(ψ + Ĝ L a).
+    /// Charges that bodies that stand still answer potentials with, L a, a = Lᵀ(ψ + Ĝ L a).
     pub(super) fn answering(&self, potentials: &[f64]) -> Vec<f64> {
         let still = DVector::zeros(6 * self.model.bodies.len());
-        self.charges(&still, &self.scattered(potentials))
+        self.charges(&still, &self.scattered(&self.projected(potentials).0))
     }
 
-    /// Ĝ α.
-    pub(super) fn potentials(&self, charges: &[f64]) -> Vec<f64> {
-        self.sums().potentials(charges)
+    /// 4π Ūᵀ(ψ + Ĝ α), α those charges.
+    pub(super) fn impulses_answered(&self, potentials: &[f64]) -> DVector<f64> {
+        let still = DVector::zeros(6 * self.model.bodies.len());
+        let (right, impulses) = self.projected(potentials);
+        let answered = self.scattered(&right);
+        impulses + self.exchanged(&self.sums(), &still, &answered).1
     }
 
     /// 4π Ūᵀ ψ.
@@ -405,6 +436,31 @@ impl Scattered<'_> {
             rows += own * twist;
         }
     }
+}
+
+/// Aᵀ x, column by column.
+fn products(a: &DMatrix<f64>, x: &[f64]) -> Vec<f64> {
+    let columns = a.as_slice().chunks_exact(x.len());
+    multipole::vectorized(
+        #[inline(always)]
+        || columns.map(|column| dot(column, x)).collect(),
+    )
+}
+
+/// A x.
+fn combined(a: &DMatrix<f64>, x: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; a.nrows()];
+    multipole::vectorized(
+        #[inline(always)]
+        || {
+            for (x, column) in x.iter().zip(a.as_slice().chunks_exact(out.len())) {
+                for (out, a) in out.iter_mut().zip(column) {
+                    *out += x * a;
+                }
+            }
+        },
+    );
+    out
 }
 
 /// x + `sign` y.

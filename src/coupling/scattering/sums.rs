@@ -1,9 +1,10 @@
 //! The Coulomb sums of all bodies: what charges see of each other, and the forces on them.
 
 use super::Scattering;
-use super::far::{self, Moments};
-use super::near::{Charged, Distances, NearPart, force_on};
+use super::far::{self, Derivatives, Moments};
+use super::near::{Charged, NearPart, force_on};
 use super::pairs::{Far, Near, Pairs, Weights};
+use super::parts::{FEW, in_parts, of_each};
 use super::places::{Places, Triple, add, cross, dot, minus};
 use crate::adjoint::lie::Vec6;
 use crate::adjoint::multipole::{self, Arithmetic, Number, WIDTH};
@@ -11,19 +12,12 @@ use num_dual::Dual64;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Parts in which pairs are summed: the same whatever the number of threads, so that sums are.
-const PARTS: usize = 4;
-/// Pairs that aren't worth another thread.
-const FEW: usize = 256;
-
 /// Sums at some places.
 pub(super) struct Sums<'s, T> {
-    model: &'s Scattering,
-    pairs: &'s Pairs,
-    places: &'s Places<T>,
-    weights: Weights<T>,
-    /// Inverse distances of the first near pairs' points.
-    known: Option<&'s Distances>,
+    pub model: &'s Scattering,
+    pub pairs: &'s Pairs,
+    pub places: &'s Places<T>,
+    pub weights: Weights<T>,
 }
 
 /// The energy's gradient: in the charges the potentials that they see, and in the bodies' places spatial wrenches.
@@ -53,31 +47,13 @@ impl Gradient<'_, Dual64> {
     }
 }
 
-/// Parts of a list, each on a thread where they are worth it.
-fn in_parts<I: Sync, P: Send>(items: &[I], part: impl Fn(&[I]) -> P + Sync + Send) -> Vec<P> {
-    let size = items.len().div_ceil(PARTS).max(1);
-    match items.len() < FEW {
-        true => items.chunks(size).map(part).collect(),
-        false => items.par_chunks(size).map(part).collect(),
-    }
-}
-
 impl<'s, T: Number> Sums<'s, T> {
     pub fn new(model: &'s Scattering, pairs: &'s Pairs, places: &'s Places<T>) -> Self {
         Self {
             weights: pairs.weights(places, &model.levels),
-            known: None,
             model,
             pairs,
             places,
-        }
-    }
-
-    /// The same with inverse distances that are known.
-    pub fn knowing(self, known: &'s Distances) -> Self {
-        Self {
-            known: Some(known),
-            ..self
         }
     }
 
@@ -102,21 +78,45 @@ impl<'s, T: Number> Sums<'s, T> {
         multipole::monomials(&self.model.table, &way, out);
     }
 
-    /// `each` of every body with room for its part of `out`, `n` numbers a body.
-    fn of_bodies<X: Send>(&self, out: &mut [X], n: usize, each: impl Fn(usize, &mut [X]) + Sync) {
-        match self.model.points.len() < FEW {
-            true => out.chunks_mut(n).enumerate().for_each(|(b, x)| each(b, x)),
+    /// `each` of every body with room for its part, `n` numbers a body.
+    pub fn of_bodies(&self, n: usize, each: impl Fn(usize, &mut [T]) + Sync) -> Vec<T> {
+        let count = self.model.points.len();
+        let mut out = vec![T::constant(0.0); n * count];
+        match count < FEW {
+            true => (out.chunks_mut(n).enumerate()).for_each(|(b, x)| each(b, x)),
             false => (out.par_chunks_mut(n).enumerate()).for_each(|(b, x)| each(b, x)),
         }
+        out
+    }
+
+    /// Moments of unit charges at a body's points about its centre, point by point, but for what they are together.
+    pub fn moments_of_points(&self, b: usize) -> Vec<T> {
+        let table = &self.model.table;
+        let n = table.moments();
+        let mut out = vec![T::constant(0.0); n * self.model.points[b].len()];
+        multipole::vectorized(
+            #[inline(always)]
+            || {
+                let mut powers = vec![T::Pack::constant(0.0); n];
+                for ((_, arm), out) in self.arms(b).zip(out.chunks_mut(n * WIDTH)) {
+                    multipole::monomials(table, &arm, &mut powers);
+                    for (k, out) in out.chunks_exact_mut(n).enumerate() {
+                        for (out, power) in out.iter_mut().zip(&powers).skip(1) {
+                            *out = T::lane(power, k);
+                        }
+                    }
+                }
+            },
+        );
+        out
     }
 
     /// Moments of all cells about their centres.
     fn moments(&self, charges: &[T]) -> Vec<T> {
-        let (table, cells) = (&self.model.table, &self.model.cells);
+        let table = &self.model.table;
         let n = table.moments();
         let zero = T::constant(0.0);
-        let mut of_bodies = vec![zero; n * self.model.points.len()];
-        self.of_bodies(&mut of_bodies, n, |b, out| {
+        let of_bodies = self.of_bodies(n, |b, out| {
             multipole::vectorized(
                 #[inline(always)]
                 || {
@@ -134,6 +134,14 @@ impl<'s, T: Number> Sums<'s, T> {
                 },
             );
         });
+        self.upward(&of_bodies)
+    }
+
+    /// Moments of all cells from those of the bodies.
+    pub fn upward(&self, of_bodies: &[T]) -> Vec<T> {
+        let (table, cells) = (&self.model.table, &self.model.cells);
+        let n = table.moments();
+        let zero = T::constant(0.0);
         let mut out = vec![zero; n * cells.cells.len()];
         for (own, leaf) in of_bodies.chunks_exact(n).zip(&cells.leaf) {
             out[n * leaf..][..n].copy_from_slice(own);
@@ -149,7 +157,12 @@ impl<'s, T: Number> Sums<'s, T> {
     }
 
     /// Coefficients of the potentials about all cells' centres, from all that they see; with what each far pair is worth if asked for.
-    fn locals(&self, plain: &[T], slopes: bool) -> (Vec<T>, Vec<(T, Triple<T>)>) {
+    pub fn locals(
+        &self,
+        plain: &[T],
+        slopes: bool,
+        known: Option<&Derivatives<T>>,
+    ) -> (Vec<T>, Vec<(T, Triple<T>)>) {
         let (table, cells) = (&self.model.table, &self.model.cells.cells);
         let n = table.moments();
         let mut signed = plain.to_vec();
@@ -163,7 +176,9 @@ impl<'s, T: Number> Sums<'s, T> {
             plain,
             signed: &signed,
         };
-        let parts = in_parts(&self.pairs.far, |pairs: &[Far]| moments.part(pairs, slopes));
+        let parts = in_parts(&self.pairs.far, |number, pairs: &[Far]| {
+            moments.part(pairs, slopes, known.map(|known| known.part(number)))
+        });
         let mut out = vec![T::constant(0.0); plain.len()];
         let mut worth = Vec::with_capacity(if slopes { self.pairs.far.len() } else { 0 });
         for part in parts {
@@ -190,9 +205,7 @@ impl<'s, T: Number> Sums<'s, T> {
             weights: &self.weights,
             charges,
         };
-        // Forces need the way as well.
-        let known = self.known.filter(|_| !forces);
-        let part = |pairs: &[Near]| charged.part(pairs, forces, known);
+        let part = |_, pairs: &[Near]| charged.part(pairs, forces);
         let parts = in_parts(&self.pairs.near, part);
         let mut out = NearPart::zeros(charges.len(), forces);
         parts.into_iter().for_each(|part| out.add(part));
@@ -227,18 +240,13 @@ impl<'s, T: Number> Sums<'s, T> {
                 },
             )
         };
-        let bodies = 0..self.model.points.len();
-        let all: Vec<Vec<[T; 4]>> = match bodies.len() < FEW {
-            true => bodies.map(one).collect(),
-            false => bodies.into_par_iter().map(one).collect(),
-        };
-        all.concat()
+        of_each(self.model.points.len(), one).concat()
     }
 
     /// G α: the potential at each point that the other bodies' charges make.
     pub fn potentials(&self, charges: &[T]) -> Vec<T> {
         let charges = &*self.model.spread(charges);
-        let (locals, _) = self.locals(&self.moments(charges), false);
+        let (locals, _) = self.locals(&self.moments(charges), false, None);
         let mut out = self.near(charges, false).potentials;
         for (out, [seen, ..]) in out.iter_mut().zip(self.seen_afar(&locals, false)) {
             *out += seen;
@@ -253,7 +261,7 @@ impl<'s, T: Number> Sums<'s, T> {
         let n = table.moments();
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let moments = self.moments(charges);
-        let (locals, worth) = self.locals(&moments, true);
+        let (locals, worth) = self.locals(&moments, true, None);
         let mut near = self.near(charges, true);
         let mut centres = vec![[zero; 3]; cells.cells.len()];
         let mut radii = vec![zero; cells.cells.len()];

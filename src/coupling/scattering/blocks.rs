@@ -1,0 +1,270 @@
+//! The exchange between few numbers of each body, as a solve asks for it again and again at the same places: matrices of near pairs, and moments of each number.
+//!
+//! A body of many points answers with few charges of its own: its modes' and its twist's, [L, Ū] z. Its numbers are z, those of a body that has fewer points its charges. With
+//! P = [L, Ū] or the identity, a near pair's matrix is Pᵀ (1/r) P, weighed, and the moments of a body's numbers are those of P's columns.
+
+use super::Scattering;
+use super::far::Derivatives;
+use super::pairs::Near;
+use super::parts::{FEW, in_parts};
+use super::places::Places;
+use super::sums::Sums;
+use crate::adjoint::multipole::{self, WIDTH};
+use crate::coupling::settings::end;
+use faer::linalg::matmul::matmul;
+use faer::prelude::IntoConst;
+use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows of a near pair's matrix that are taken together, and columns.
+const LANES: usize = 4;
+const TOGETHER: usize = 4;
+
+/// At some places.
+pub(super) struct Blocks {
+    /// Moments of each number about its body's centre, number by number.
+    moments: Vec<f64>,
+    /// Between the cells of far pairs.
+    far: Derivatives<f64>,
+    /// Matrices of the near pairs in parts, each with its pairs: column by column, rows of the first body filled up to whole lanes, one pair after the other.
+    near: Vec<(Range<usize>, Vec<f64>)>,
+}
+
+/// Room for one near pair.
+#[derive(Default)]
+struct Room {
+    /// The first body's points, filled up to eights, and their inverse distances from those of the second, column by column.
+    to: [Vec<f64>; 3],
+    inverse: Vec<f64>,
+    /// (1/r) P of the second.
+    half: Vec<f64>,
+}
+
+impl Scattering {
+    /// P of a body or of what a mirror shows of it; none that is the identity.
+    fn carrier(&self, b: usize) -> Option<MatRef<'_, f64>> {
+        let body = &self.bodies[b % self.bodies.len()];
+        let basis = body.basis();
+        (basis.ncols() < basis.nrows()).then(|| {
+            MatRef::from_column_major_slice(basis.as_slice(), basis.nrows(), basis.ncols())
+        })
+    }
+}
+
+impl Blocks {
+    pub fn new(sums: &Sums<'_, f64>) -> Self {
+        let model = sums.model;
+        let n = model.table.moments();
+        let mut moments = vec![0.0; n * end(&model.numbers)];
+        // Of the points, then of the numbers.
+        for (b, own) in model.numbers.iter().enumerate() {
+            let of_points = sums.moments_of_points(b);
+            let out = &mut moments[n * own.start..n * own.end];
+            match model.carrier(b) {
+                None => out.copy_from_slice(&of_points),
+                Some(carrier) => {
+                    let of_points = MatRef::from_column_major_slice(&of_points, n, carrier.nrows());
+                    let out = MatMut::from_column_major_slice_mut(out, n, own.len());
+                    matmul(out, Accum::Replace, of_points, carrier, 1.0, Par::Seq);
+                }
+            }
+        }
+        let all = &sums.pairs.near;
+        let near = in_parts(all, |_, pairs: &[Near]| {
+            let first = pairs.first().map_or(0, |near| near.number);
+            let (mut out, mut room) = (Vec::new(), Room::default());
+            for near in pairs {
+                let weight = sums.weights.within(near.within);
+                room.matrix(model, sums.places, near, weight, &mut out);
+            }
+            (first..first + pairs.len(), out)
+        });
+        Self {
+            far: Derivatives::new(&model.table, sums.places, &sums.pairs.far),
+            moments,
+            near,
+        }
+    }
+
+    /// What the numbers see of each other.
+    pub fn seen(&self, sums: &Sums<'_, f64>, numbers: &[f64]) -> Vec<f64> {
+        let model = sums.model;
+        let numbers = &*model.spread(numbers);
+        let n = model.table.moments();
+        let of_bodies = sums.of_bodies(n, |b, out| {
+            let own = model.numbers[b].clone();
+            let columns = self.moments[n * own.start..n * own.end].chunks_exact(n);
+            for (column, x) in columns.zip(&numbers[own]) {
+                for (out, m) in out.iter_mut().zip(column) {
+                    *out += x * m;
+                }
+            }
+        });
+        let (locals, _) = sums.locals(&sums.upward(&of_bodies), false, Some(&self.far));
+        let mut out = self.near(sums, numbers);
+        for (own, leaf) in model.numbers.iter().zip(&model.cells.leaf) {
+            let local = &locals[n * leaf..][..n];
+            let columns = self.moments[n * own.start..n * own.end].chunks_exact(n);
+            for (out, column) in out[own.clone()].iter_mut().zip(columns) {
+                *out += dot(local, column);
+            }
+        }
+        model.gathered(out)
+    }
+
+    fn near(&self, sums: &Sums<'_, f64>, numbers: &[f64]) -> Vec<f64> {
+        let model = sums.model;
+        let part = |(pairs, matrices): &(Range<usize>, Vec<f64>)| {
+            let mut out = vec![0.0; numbers.len()];
+            multipole::vectorized(
+                #[inline(always)]
+                || {
+                    let mut rest = &matrices[..];
+                    let (mut own, mut seen) = (Vec::new(), Vec::new());
+                    for near in &sums.pairs.near[pairs.clone()] {
+                        let [a, b] = near.bodies.map(|b| model.numbers[b].clone());
+                        let stride = a.len().next_multiple_of(LANES);
+                        let (matrix, after) = rest.split_at(stride * b.len());
+                        rest = after;
+                        own.clear();
+                        own.extend_from_slice(&numbers[a.clone()]);
+                        own.resize(stride, 0.0);
+                        seen.clear();
+                        seen.resize(stride, 0.0);
+                        let mut columns = matrix.chunks_exact(TOGETHER * stride);
+                        let mut others = numbers[b.clone()].chunks_exact(TOGETHER);
+                        let mut seen_b = out[b].chunks_exact_mut(TOGETHER);
+                        for ((x, out), columns) in (&mut others).zip(&mut seen_b).zip(&mut columns)
+                        {
+                            both::<TOGETHER>(columns, [&own, x], [&mut seen, out]);
+                        }
+                        let left = others.remainder().iter().zip(seen_b.into_remainder());
+                        for ((x, out), column) in left.zip(columns.remainder().chunks_exact(stride))
+                        {
+                            both::<1>(
+                                column,
+                                [&own, &[*x]],
+                                [&mut seen, std::slice::from_mut(out)],
+                            );
+                        }
+                        for (out, x) in out[a].iter_mut().zip(&seen) {
+                            *out += x;
+                        }
+                    }
+                },
+            );
+            out
+        };
+        let mut out = vec![0.0; numbers.len()];
+        let parts: Vec<_> = match sums.pairs.near.len() < FEW {
+            true => self.near.iter().map(part).collect(),
+            false => self.near.par_iter().map(part).collect(),
+        };
+        for seen in parts {
+            out.iter_mut().zip(seen).for_each(|(out, x)| *out += x);
+        }
+        out
+    }
+}
+
+impl Room {
+    /// Adds the matrix of a pair to a list.
+    fn matrix(
+        &mut self,
+        model: &Scattering,
+        places: &Places<f64>,
+        near: &Near,
+        weight: f64,
+        out: &mut Vec<f64>,
+    ) {
+        let [a, b] = near.bodies.map(|b| model.points[b].clone());
+        let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
+        let stride = a.len().next_multiple_of(WIDTH);
+        // Beyond the last point it stands again.
+        for (own, all) in self.to.iter_mut().zip(&places.points) {
+            own.clear();
+            own.extend_from_slice(&all[a.clone()]);
+            own.resize(stride, all[a.end - 1]);
+        }
+        self.inverse.resize(b.len() * stride, 0.0);
+        multipole::vectorized(
+            #[inline(always)]
+            || {
+                let to = [&self.to[0][..], &self.to[1], &self.to[2]];
+                for (j, inverse) in b.clone().zip(self.inverse.chunks_exact_mut(stride)) {
+                    multipole::inverse_distances(&places.point(j), to, inverse);
+                }
+            },
+        );
+        let inverse = &self.inverse[..b.len() * stride];
+        let inverse =
+            MatRef::from_column_major_slice_with_stride(inverse, a.len(), b.len(), stride);
+        let half = match model.carrier(near.bodies[1]) {
+            None => inverse,
+            Some(carrier) => {
+                self.half.resize(a.len() * columns, 0.0);
+                let half = &mut self.half[..];
+                let mut half = MatMut::from_column_major_slice_mut(half, a.len(), columns);
+                let to = half.as_mut();
+                matmul(to, Accum::Replace, inverse, carrier, 1.0, Par::Seq);
+                half.into_const()
+            }
+        };
+        let (start, room) = (out.len(), rows.next_multiple_of(LANES));
+        out.resize(start + room * columns, 0.0);
+        let own = &mut out[start..];
+        match model.carrier(near.bodies[0]) {
+            Some(carrier) => {
+                let own = MatMut::from_column_major_slice_with_stride_mut(own, rows, columns, room);
+                let carrier = carrier.transpose();
+                matmul(own, Accum::Replace, carrier, half, weight, Par::Seq);
+            }
+            None => {
+                for (own, half) in own.chunks_exact_mut(room).zip(half.col_iter()) {
+                    own.iter_mut()
+                        .zip(half.iter())
+                        .for_each(|(own, x)| *own = weight * x);
+                }
+            }
+        }
+    }
+}
+
+/// Of N columns of A: adds A y to `seen` and Aᵀ x to `out`, each number being loaded once.
+#[inline(always)]
+fn both<const N: usize>(a: &[f64], [x, y]: [&[f64]; 2], [seen, out]: [&mut [f64]; 2]) {
+    let columns: [&[f64]; N] = std::array::from_fn(|k| &a[k * x.len()..][..x.len()]);
+    let mut sums = [[0.0; LANES]; N];
+    for (i, (x, seen)) in (x.chunks_exact(LANES).zip(seen.chunks_exact_mut(LANES))).enumerate() {
+        let own: [&[f64]; N] = columns.map(|column| &column[LANES * i..][..LANES]);
+        for l in 0..LANES {
+            let mut sum = seen[l];
+            for k in 0..N {
+                sums[k][l] += x[l] * own[k][l];
+                sum += y[k] * own[k][l];
+            }
+            seen[l] = sum;
+        }
+    }
+    for (out, sums) in out.iter_mut().zip(&sums) {
+        *out += sums.iter().sum::<f64>();
+    }
+}
+
+/// Σ xᵢ yᵢ in lanes that are added up at the end, so that it is as fast as the processor's vectors are wide.
+#[inline(always)]
+pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut lanes = [0.0; WIDTH];
+    let (mut eights, mut others) = (x.chunks_exact(WIDTH), y.chunks_exact(WIDTH));
+    for (x, y) in (&mut eights).zip(&mut others) {
+        for ((lane, x), y) in lanes.iter_mut().zip(x).zip(y) {
+            *lane += x * y;
+        }
+    }
+    let rest = eights.remainder().iter().zip(others.remainder());
+    for (lane, (x, y)) in lanes.iter_mut().zip(rest) {
+        *lane += x * y;
+    }
+    lanes.iter().sum()
+}

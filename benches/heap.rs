@@ -1,7 +1,7 @@
 //! Bodies that settle in water into a heap: what a step costs, whether any is lost, and how the cost grows with the bodies.
 //!
-//! `cargo bench --bench heap [-- --bodies N] [--seconds T] [--step DT] [--fidelity NAME] [--integrator NAME] [--growth]`: 200 bodies over 5 s in steps of 0.005 s,
-//! `isolated`, by momentum Euler; `--growth` instead 25 to 400 bodies over a shorter time.
+//! `cargo bench --bench heap [-- --bodies N] [--seconds T] [--step DT] [--fidelity NAME] [--accuracy A] [--exchange auto|factor|products] [--integrator NAME] [--growth]`: 200 bodies
+//! over 5 s in steps of 0.005 s, `isolated`, by momentum Euler; `--growth` instead 25 to 400 bodies over a shorter time.
 
 #[allow(dead_code)]
 mod common;
@@ -9,6 +9,7 @@ mod common;
 use common::arguments;
 use common::support::heap::{Heap, heap};
 use hydrograd::dynamics::Integrator;
+use hydrograd::simulate::Exchange;
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use std::time::Instant;
 
@@ -19,6 +20,8 @@ struct Case {
     seconds: f64,
     step: f64,
     fidelity: Fidelity,
+    accuracy: Option<f64>,
+    exchange: Exchange,
     integrator: Integrator,
 }
 
@@ -27,7 +30,12 @@ impl Case {
     fn run(&self) -> hydrograd::Result<(Rollout, f64, f64)> {
         let settings = Settings::default()
             .fidelity(self.fidelity)
+            .exchange(self.exchange)
             .integrator(self.integrator);
+        let settings = match self.accuracy {
+            Some(accuracy) => settings.accuracy(accuracy),
+            None => settings,
+        };
         let start = Instant::now();
         let simulator = Simulator::new(&heap(self.bodies, self.step), settings)?;
         let prepared = start.elapsed().as_secs_f64();
@@ -81,6 +89,11 @@ fn main() -> hydrograd::Result<()> {
         fidelity: match after("--fidelity") {
             Some(name) => name.parse().expect("the name of a fidelity"),
             None => Fidelity::Isolated,
+        },
+        accuracy: after("--accuracy").and_then(|x| x.parse().ok()),
+        exchange: match after("--exchange") {
+            Some(name) => name.parse().expect("the name of an exchange"),
+            None => Exchange::Auto,
         },
         integrator: match after("--integrator") {
             Some(name) => name.parse().expect("the name of an integrator"),

@@ -227,7 +227,7 @@ pub fn iterations() -> hydrograd::Result<()> {
             vec![body.clone(); 64],
             names,
             &poses,
-            Levels::for_accuracy(1e-3, 25.0)?,
+            Levels::for_accuracy(1e-3)?,
         )?;
         let first = DVector::from_fn(6 * 64, |_, _| 0.5 * drawn.number());
         let mut row = Vec::new();

@@ -45,8 +45,7 @@ pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Resu
         true => numerics.accuracy.min(numerics.compress.tolerance),
         false => numerics.accuracy,
     };
-    let points: usize = made.iter().map(|body| body.points()).sum();
-    let levels = Levels::for_accuracy(aim, points as f64 / made.len().max(1) as f64)?;
+    let levels = Levels::for_accuracy(aim)?;
     let images = Image::of_walls(problem.walls)?;
     Scattering::between(made, names, problem.start, images, levels)?.excluding(&problem.excluded)
 }

@@ -208,7 +208,7 @@ pub(super) fn scattering_systems() -> Vec<Scattering> {
     let of = |sure: f64, most: f64| {
         let levels = Levels {
             bodies: Apart { sure, most },
-            ..Levels::for_accuracy(1e-3, 30.0).unwrap()
+            ..Levels::for_accuracy(1e-3).unwrap()
         };
         let names = vec!["a".to_string(), "b".to_string()];
         Scattering::new(bodies.clone(), names, &poses(), levels).unwrap()

@@ -74,8 +74,7 @@ fn grid(drawn: &mut Samples, count: usize, gap: f64) -> Vec<Pose> {
 fn both(kinds: &[Arc<ReducedBody>; 2], poses: &[Pose], accuracy: f64) -> (Reduced, Scattering) {
     let bodies: Vec<_> = (0..poses.len()).map(|b| kinds[b % 2].clone()).collect();
     let factor = Reduced::new(bodies, &[], |_, _| None).unwrap();
-    let points: usize = kinds.iter().map(|body| body.points()).sum();
-    let levels = Levels::for_accuracy(accuracy, 0.5 * points as f64).unwrap();
+    let levels = Levels::for_accuracy(accuracy).unwrap();
     let products = Scattering::of(&factor, poses, levels).unwrap();
     (factor, products)
 }
@@ -310,7 +309,7 @@ fn walls_mirror_bodies_as_the_factor_does() {
     let factor = Reduced::new(bodies.clone(), &walls, |_, _| None).unwrap();
     let names = (0..12).map(|b| format!("fish {b}")).collect();
     let images = Image::of_walls(&walls).unwrap();
-    let levels = Levels::for_accuracy(0.01, 30.0).unwrap();
+    let levels = Levels::for_accuracy(0.01).unwrap();
     let products = Scattering::between(bodies, names, &poses, images, levels).unwrap();
     let twists = DMatrix::from_fn(72, 2, |_, _| 0.5 * drawn.number());
     let columns = |coupling: &dyn Coupling| {
@@ -486,7 +485,7 @@ fn what_isnt_there_is_refused_by_name() {
     );
     let poses = vec![Pose::identity()];
     let kinds = kinds(0.03);
-    let levels = Levels::for_accuracy(0.01, 30.0).unwrap();
+    let levels = Levels::for_accuracy(0.01).unwrap();
     let one = || vec![kinds[0].clone()];
     says(
         refusal(Scattering::new(one(), Vec::new(), &poses, levels)),
@@ -498,10 +497,7 @@ fn what_isnt_there_is_refused_by_name() {
         refusal(Scattering::new(one(), named, &[bad], levels)),
         &["shoal", "finite"],
     );
-    says(
-        refusal(Levels::for_accuracy(0.0, 30.0)),
-        &["accuracy", "0.01"],
-    );
+    says(refusal(Levels::for_accuracy(0.0)), &["accuracy", "0.01"]);
     let pair = both(&kinds, &grid(&mut Samples::new(1), 2, 1.0), 0.01).1;
     says(
         refusal(pair.excluding(&Exclusions::new([(0, 7)]))),

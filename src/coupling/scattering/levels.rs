@@ -1,15 +1,12 @@
 //! How finely the exchange is cut into levels, for an accuracy.
 
-use crate::adjoint::multipole::{MOST, Number};
+use crate::adjoint::multipole::Number;
 use crate::{Error, Result};
 
 /// Relative residual at which solves end: what gradients are held against is finer than any level.
 const TOLERANCE: f64 = 1e-10;
 /// Of the ratio from which on moments don't stand for points, the part up to which they do so alone.
 const SURE: f64 = 0.9;
-
-/// Points of a body, in the mean, from which on moments of a higher degree are faster.
-const MANY: f64 = 60.0;
 
 /// Levels of the exchange between many bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,12 +22,11 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// For an error of the coupling of `accuracy`, relative to the bodies' own added mass, of bodies that have so many `points` in the mean: sums over many points are worth
-    /// moments of a higher degree, which stand for them from nearer on.
+    /// For an error of the coupling of `accuracy`, relative to the bodies' own added mass.
     ///
     /// # Errors
     /// [`Error::Input`] for an accuracy that isn't between 0 and 1.
-    pub fn for_accuracy(accuracy: f64, points: f64) -> Result<Self> {
+    pub fn for_accuracy(accuracy: f64) -> Result<Self> {
         if !(accuracy > 0.0 && accuracy < 1.0) {
             return Err(Error::input(
                 "settings: accuracy",
@@ -38,7 +34,7 @@ impl Levels {
                 "a number between 0 and 1, such as 0.01",
             ));
         }
-        let (least, bodies, cells): (usize, f64, f64) = match accuracy {
+        let (degree, bodies, cells) = match accuracy {
             a if a >= 0.03 => (4, 0.4, 0.5),
             a if a >= 0.01 => (5, 0.4, 0.5),
             a if a >= 3e-3 => (6, 0.4, 0.5),
@@ -47,13 +43,6 @@ impl Levels {
             a if a >= 1e-4 => (9, 0.4, 0.45),
             _ => (10, 0.35, 0.4),
         };
-        let degree = match points > MANY {
-            true => (2 * least).min(MOST),
-            false => least,
-        };
-        // What is left out goes with the ratio to the power of the degree and one.
-        let power = (least + 1) as f64 / (degree + 1) as f64;
-        let [bodies, cells] = [bodies, cells].map(|most| most.powf(power));
         let apart = |most: f64| Apart {
             sure: SURE * most,
             most,

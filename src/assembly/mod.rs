@@ -236,7 +236,7 @@ pub(crate) fn assemble(
     }
     let mut water = water::prepare(
         scene,
-        (&choices.water, !choices.integrator.solves_contact()),
+        &choices.water,
         in_water,
         &poses,
         clearance,
@@ -277,9 +277,7 @@ fn by_products(scene: &Scene, choices: &Choices) -> bool {
     let exchange = choices.water.numerics.exchange;
     let water = &choices.water;
     let compressed = water.backend == Backend::Cpu && choices.shape_parameters.is_empty();
-    compressed
-        && water.fidelity.kind().compresses()
-        && exchange.expected(scene, !choices.integrator.solves_contact())
+    compressed && water.fidelity.kind().compresses() && exchange.expected(scene)
 }
 
 /// Numbers that a step takes at once. Where bodies feel each other through the water, of all velocities with all: the mass matrix with its factor and that of the

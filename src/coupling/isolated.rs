@@ -43,6 +43,11 @@ impl Isolated {
         Ok(self)
     }
 
+    /// The added mass of each body, at unit density (body frame, about its origin).
+    pub fn added_masses(&self) -> &[Mat6] {
+        &self.added_mass
+    }
+
     /// Impulses of columns of twists.
     fn impulses(&self, twists: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(twists.nrows(), twists.ncols());

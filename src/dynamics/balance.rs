@@ -17,6 +17,7 @@
 use super::fluid::{self, FluidMomenta};
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::island_matrix::IslandMatrix;
+use super::islands::Islands;
 use super::linearisation::Water;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Parameters, Slopes};
@@ -365,7 +366,10 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         control: &DVector<f64>,
     ) -> Result<IslandMatrix> {
-        let islands = self.islands();
+        let islands = match self.scattered() {
+            Some(_) => Islands::whole(self.system.tree.velocities()),
+            None => self.islands(),
+        };
         let changes = islands.changes();
         let changed = match (self.acting(), &self.fluid) {
             (Some(water), FluidMomenta::Coupled(_) | FluidMomenta::Scattered(_)) => {

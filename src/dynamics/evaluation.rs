@@ -5,10 +5,11 @@ use super::island_matrix::IslandMatrix;
 use super::{JointLimit, PairContact, Parameters, System};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, six};
 use crate::coupling::CouplingReport;
+use crate::coupling::scattering::Scattered;
 use crate::multibody::Kinematics;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Where coordinates left floating point: before the step's end, at a stage of it.
 pub(crate) const WITHIN: &str = "within the step";
@@ -36,7 +37,7 @@ pub struct Evaluation<'a> {
     pub(super) fluid: FluidMomenta<'a>,
     /// M(q), once it has been asked for ([`Evaluation::mass_matrix`]).
     pub(super) mass_matrix: OnceLock<DMatrix<f64>>,
-    /// The same by islands ([`Evaluation::mass_blocks`]).
+    /// By islands ([`Evaluation::mass_blocks`]).
     pub(super) mass_blocks: OnceLock<IslandMatrix>,
     /// Generalised momentum at v = 0, from the current: of the water, and of the bodies relative to what may drift.
     pub rest_momentum: DVector<f64>,
@@ -186,6 +187,14 @@ impl<'a> Evaluation<'a> {
         out
     }
 
+    /// Bodies so many that they are coupled by products.
+    pub(super) fn scattered(&self) -> Option<&Arc<Scattered<'a>>> {
+        match &self.fluid {
+            FluidMomenta::Scattered(at) => Some(at),
+            FluidMomenta::Still | FluidMomenta::Apart(_) | FluidMomenta::Coupled(_) => None,
+        }
+    }
+
     /// Coefficients on the fluid's basis of the velocity `v` through the water.
     pub fn through_water(&self, v: &DVector<f64>) -> DVector<f64> {
         self.extended(v, 1.0)
@@ -312,9 +321,9 @@ impl<'a> Evaluation<'a> {
 
     /// What the coupling reports.
     pub fn report(&self) -> CouplingReport {
-        match &self.fluid {
-            FluidMomenta::Scattered(at) => at.report(),
-            _ => self.report.clone(),
+        match self.scattered() {
+            Some(at) => at.report(),
+            None => self.report.clone(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The mass matrix M(q) = M_r + ρ Jᵀ M̄_f J: its products, itself, and its factor.
 
 use super::fluid::{self, FluidMomenta};
+use super::islands::Islands;
 use super::recoil::Recoiling;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
@@ -50,7 +51,10 @@ impl<'a> Evaluation<'a> {
             let made = match self.fluid {
                 FluidMomenta::Coupled(_) => self.rigid_and_coupled(),
                 FluidMomenta::Apart(_) | FluidMomenta::Still | FluidMomenta::Scattered(_) => {
-                    let islands = self.islands();
+                    let islands = match self.scattered() {
+                        Some(_) => Islands::whole(self.system.tree.velocities()),
+                        None => self.islands(),
+                    };
                     let changes = islands.changes();
                     let products: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
                     islands.matrix(&products)
@@ -98,6 +102,7 @@ impl<'a> Evaluation<'a> {
                     return self.factored_dense(free);
                 }
                 let own = self.articulated(free, Some(at.own()))?;
+                let own = Box::new(move |right: &DVector<f64>| own.solve(right));
                 return Ok(Inertia::Recoiling(Recoiling::new(self, at, own)));
             }
         };
@@ -144,6 +149,14 @@ impl<'a> Evaluation<'a> {
     /// The first that didn't.
     pub(crate) fn check(&self) -> Result<()> {
         self.fluid.check()
+    }
+
+    /// M(q) v but for what many bodies that are coupled by products exchange.
+    pub(super) fn mass_alone_times(&self, v: &DVector<f64>) -> DVector<f64> {
+        match self.scattered() {
+            Some(at) => self.own_mass_times(at.own(), v),
+            None => self.mass_times(v),
+        }
     }
 
     /// M v of bodies with these added masses that don't feel each other.

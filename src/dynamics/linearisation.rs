@@ -2,7 +2,7 @@
 
 use super::fluid::FluidMomenta;
 use super::{Evaluation, Parameters, System};
-use crate::adjoint::lie::Vec6;
+use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::coupling::scattering::ScatteredLinearised;
 use crate::coupling::{Linearise, Linearised};
 use crate::multibody::Kinematics;
@@ -72,14 +72,25 @@ impl System {
         })
     }
 
+    /// The water of bodies that don't feel each other.
+    fn water_apart<'c>(
+        coupling: &'c dyn Linearise,
+        poses: &[Pose],
+        added: &'c [Mat6],
+    ) -> Result<Water<'c>> {
+        // No pose changes it: nobody asks for its derivatives on a basis.
+        let none = DMatrix::zeros(6 * poses.len(), 0);
+        Ok(Water {
+            linearised: coupling.linearise(poses, &none)?,
+            fluid: FluidMomenta::Apart(added),
+        })
+    }
+
     fn water(&self, kinematics: &Kinematics) -> Result<Water<'_>> {
         let coupling = self.differentiable()?;
-        if let Some(fluid) = self.fluid_apart(true) {
-            // No pose changes it: nobody asks for its derivatives on a basis.
+        if let Some(added) = self.coupling.apart() {
             let poses: Vec<_> = self.submerged().map(|(b, _)| kinematics.poses[b]).collect();
-            let none = DMatrix::zeros(6 * poses.len(), 0);
-            let linearised = coupling.linearise(&poses, &none)?;
-            return Ok(Water { linearised, fluid });
+            return Self::water_apart(coupling, &poses, added);
         }
         if let Some(placed) = self.fluid_scattered(kinematics)? {
             return Ok(Water {
@@ -112,6 +123,34 @@ impl<'a> Linearisation<'a> {
     /// Spatial momenta of the bodies at unit density, of water that acts or not, for coefficients on the basis.
     pub(super) fn momenta_in(&self, water: &Water, direction: &DVector<f64>) -> Vec<Vec6> {
         (water.fluid).along(self.system, &self.kinematics, direction)
+    }
+
+    /// The same where many bodies that are coupled by products don't feel each other, without places of contact; none of others.
+    ///
+    /// # Errors
+    /// None of them.
+    pub(super) fn alone(&self) -> Result<Option<Linearisation<'a>>> {
+        let Some(at) = self.scattered() else {
+            return Ok(None);
+        };
+        let (alone, system) = (at.alone(), self.system);
+        let poses: Vec<_> = (system.submerged())
+            .map(|(b, _)| self.kinematics.poses[b])
+            .collect();
+        let water = System::water_apart(alone, &poses, alone.added_masses())?;
+        let evaluation = Evaluation::new(
+            system,
+            self.parameters,
+            &self.q,
+            self.time,
+            self.kinematics.clone(),
+            water.fluid.clone(),
+            Default::default(),
+        );
+        Ok(Some(Linearisation {
+            evaluation,
+            water: OnceLock::from(water),
+        }))
     }
 
     /// The water at unit density, where any acts.

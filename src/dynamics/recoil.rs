@@ -1,23 +1,25 @@
 //! M(q)⁻¹ of many bodies that feel each other, without M(q): what others exchange with each recoils in its own inertia.
 //!
 //! With the bodies' inertias alone, own added mass with them, M = M₀ + ρ Jᵀ H J, H v̄ the impulses that others exchange with each body. M v = p is v = M₀⁻¹ (p − ρ Jᵀ h), h = H J v, and
-//! with M₀⁻¹ of each joint tree for itself ([`Articulated`]) the system is one in the charges ([`Scattered::recoil`]).
+//! with M₀⁻¹ of each joint tree for itself ([`Articulated`](crate::multibody::Articulated)) the system is one in the charges ([`Scattered::recoil`]). Whatever else is added to M₀ and is easily divided by goes with it: contact that presses,
+//! what turns and damps in an implicit stage.
 
 use super::Evaluation;
 use crate::adjoint::lie::Mat6;
-use crate::coupling::scattering::Scattered;
-use crate::multibody::Articulated;
+use crate::coupling::scattering::{Recoiled, Scattered};
 use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Least inertia, of a body's largest, that a twist is measured by.
 const LEAST: f64 = 1e-6;
 
+/// v with M₀ v = the impulses given on the free velocities, and zero on driven ones.
+pub(super) type Own<'a> = Box<dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync + 'a>;
+
 /// The factor of M(q), free rows and columns, of many bodies.
 pub struct Recoiling<'a> {
     at: Arc<Scattered<'a>>,
-    /// M₀.
-    own: Articulated,
+    own: Own<'a>,
     /// About the root of the inertia of each body-frame twist, at unit density.
     scale: DVector<f64>,
     density: f64,
@@ -26,11 +28,7 @@ pub struct Recoiling<'a> {
 }
 
 impl<'a> Recoiling<'a> {
-    pub(super) fn new(
-        evaluation: &Evaluation<'a>,
-        at: &Arc<Scattered<'a>>,
-        own: Articulated,
-    ) -> Self {
+    pub(super) fn new(evaluation: &Evaluation<'a>, at: &Arc<Scattered<'a>>, own: Own<'a>) -> Self {
         let system = evaluation.system;
         let density = evaluation.parameters.density();
         let mut scale = DVector::zeros(6 * system.coupling.bodies());
@@ -66,7 +64,7 @@ impl<'a> Recoiling<'a> {
         if self.current {
             all = all.rows(0, all.len() - 1).into_owned();
         }
-        self.own.solve(&(self.density * all))
+        (self.own)(&(self.density * all))
     }
 
     /// v with M v = `right` on the free rows; driven ones rest.
@@ -76,11 +74,20 @@ impl<'a> Recoiling<'a> {
 
     /// v with given velocities `driven` (zero where free), and M v = `right` + M₀ `driven` on the free rows.
     pub fn solve_beside(&self, right: &DVector<f64>, driven: &DVector<f64>) -> DVector<f64> {
-        let first = driven + self.own.solve(right);
-        let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
-        let found = (self.at).recoil(&self.twists(&first), &self.scale, recoil);
-        let v = first - self.answered(&found.exchanged);
+        let first = driven + (self.own)(right);
+        let (v, found) = self.recoiled(first);
         self.at.settle(self.twists(&v), found);
         v
+    }
+
+    /// [`Recoiling::solve`] for a change of the velocity, of which the water is asked no more.
+    pub(super) fn change(&self, right: &DVector<f64>) -> DVector<f64> {
+        self.recoiled((self.own)(right)).0
+    }
+
+    fn recoiled(&self, first: DVector<f64>) -> (DVector<f64>, Recoiled) {
+        let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
+        let found = (self.at).recoil(&self.twists(&first), &self.scale, recoil);
+        (first - self.answered(&found.exchanged), found)
     }
 }

@@ -1,7 +1,7 @@
 //! How fast forces that depend on the velocity slow what moves: what explicit integrators must resolve.
 //!
 //! With D = ∂g/∂v, g being the forces in the user's coordinates without the water's inertia, the rates are the eigenvalues of M^-½ ½(−D − Dᵀ) M^-½ on the coordinates
-//! that nothing drives.
+//! that nothing drives. Of many bodies that are coupled by products M is what each tree has alone.
 
 use super::fluid::FluidMomenta;
 use super::force::{Loads, Velocity};
@@ -70,7 +70,7 @@ impl Evaluation<'_> {
         if slowed.iter().all(|column| column.iter().all(|x| *x == 0.0)) {
             return Ok(None);
         }
-        let inertia: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
+        let inertia: Vec<_> = changes.iter().map(|v| self.mass_alone_times(v)).collect();
         let mut found: Option<Damping> = None;
         for ((island, slowed), (_, inertia)) in
             islands.blocks(&slowed).zip(islands.blocks(&inertia))

@@ -6,12 +6,11 @@ use super::island_matrix::{IslandMatrix, MANY};
 use super::islands::Islands;
 
 impl Evaluation<'_> {
-    /// One where the water couples the bodies or a force may; else one for the trees of joints that forces tie together. Contact isn't asked.
+    /// One where the water couples the bodies or a force may; else one for the trees of joints that forces tie together. Contact isn't asked, nor what many bodies
+    /// exchange by products.
     pub(super) fn islands(&self) -> Islands {
         match self.fluid {
-            FluidMomenta::Coupled(_) | FluidMomenta::Scattered(_) => {
-                Islands::whole(self.system.tree.velocities())
-            }
+            FluidMomenta::Coupled(_) => Islands::whole(self.system.tree.velocities()),
             _ => self.tied(self.system.smooth_forces().map(|f| f.ties()).collect()),
         }
     }
@@ -47,15 +46,16 @@ impl Evaluation<'_> {
         Islands::new(each, tree.velocities())
     }
 
-    /// M(q) by islands: made when it is first asked for.
+    /// M(q) by islands, but for what many bodies exchange by products: made when it is first asked for.
     pub(super) fn mass_blocks(&self) -> &IslandMatrix {
         self.mass_blocks.get_or_init(|| {
             let islands = self.islands();
-            if islands.velocities() < MANY || islands.is_whole() {
+            let few = islands.velocities() < MANY || islands.is_whole();
+            if few && self.scattered().is_none() {
                 return IslandMatrix::whole(self.mass_matrix().clone());
             }
             let changes = islands.changes();
-            let products: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
+            let products: Vec<_> = changes.iter().map(|v| self.mass_alone_times(v)).collect();
             IslandMatrix::new(islands, &products).symmetric()
         })
     }

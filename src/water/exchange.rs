@@ -3,12 +3,18 @@
 use crate::scene::{Body, Scene};
 
 /// Bodies from which on products alone are faster (`cargo bench --bench bodies`).
-pub(super) const MANY: usize = 24;
+const MANY: usize = 24;
+
+/// Whether products are faster for so many bodies between so many walls, each of which doubles what is summed.
+pub(super) fn faster(bodies: usize, walls: usize) -> bool {
+    let walls = u32::try_from(walls).unwrap_or(u32::MAX);
+    bodies >= MANY.saturating_mul(2_usize.saturating_pow(walls))
+}
 
 choices! {
     /// How compressed bodies are coupled.
     pub enum Exchange {
-        /// By products from 24 bodies on where the scene and the integrator take them. Films don't act then, and flow, pressure and sensors aren't told.
+        /// By products from 24 bodies on, twice as many with each wall, where the scene takes them. Films don't act then, and flow, pressure and sensors aren't told.
         #[default]
         Auto,
         /// By a factor of the whole exchange, cubic in the number of bodies.
@@ -19,14 +25,14 @@ choices! {
 }
 
 impl Exchange {
-    /// Whether it will surely be by products as far as the scene tells, `steps` being whether nothing asks for the matrix of inertia: for what a scene takes.
-    pub(crate) fn expected(self, scene: &Scene, steps: bool) -> bool {
+    /// Whether it will surely be by products as far as the scene tells: for what a scene takes.
+    pub(crate) fn expected(self, scene: &Scene) -> bool {
         let plain = |b: &Body| b.mimic.is_none() && b.added_mass.is_none();
-        let takes = steps && scene.walls.is_empty() && scene.bodies.iter().all(plain);
+        let takes = scene.bodies.iter().all(plain);
         match self {
             Exchange::Factor => false,
             Exchange::Products => takes,
-            Exchange::Auto => takes && scene.bodies.len() >= MANY,
+            Exchange::Auto => takes && faster(scene.bodies.len(), scene.walls.len()),
         }
     }
 }

@@ -57,13 +57,13 @@ const FILM_EDGES: f64 = 0.1;
 /// What the flow that compression leaves out is worth in the added mass.
 const LEFT_OUT: f64 = 0.012;
 
-/// Couples the bodies of a scene, which start at `poses` (all bodies of the scene); `explicit` says that no integrator asks for the matrix of inertia.
+/// Couples the bodies of a scene, which start at `poses` (all bodies of the scene).
 ///
 /// # Errors
 /// A device that can't be opened, bodies that the method or the fidelity can't take, or whatever the discretisation reports.
 pub(crate) fn prepare(
     scene: &Scene,
-    (choices, explicit): (&WaterChoices, bool),
+    choices: &WaterChoices,
     (numbers, submerged): (Vec<usize>, Vec<SubmergedBody>),
     poses: &[Pose],
     mut clearance: Clearance,
@@ -80,8 +80,7 @@ pub(crate) fn prepare(
     problem.start = &start;
     let compressed = scene.fluid.density > 0.0 && choices.fidelity.kind().compresses();
     let on_cpu = choices.backend == Backend::Cpu;
-    problem.products =
-        compressed && by_products(choices.numerics.exchange, &problem, explicit, on_cpu)?;
+    problem.products = compressed && by_products(choices.numerics.exchange, &problem, on_cpu)?;
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,

@@ -1,25 +1,20 @@
 //! Compressed bodies that are coupled by products alone: whether, and how.
 
-use super::exchange::{Exchange, MANY};
+use super::exchange::{Exchange, faster};
 use super::method::kind::Problem;
 use crate::coupling::reduced::ReducedBody;
 use crate::coupling::scattering::{Levels, Scattering};
+use crate::geometry::Image;
 use crate::{Error, Result};
 use std::sync::Arc;
 
-/// Whether bodies are coupled by products, `steps` being whether the integrator needs no matrix.
+/// Whether bodies are coupled by products.
 ///
 /// # Errors
 /// [`Error::Unsupported`] where they were asked for and something doesn't take them.
-pub(super) fn by_products(
-    exchange: Exchange,
-    problem: &Problem,
-    steps: bool,
-    on_cpu: bool,
-) -> Result<bool> {
+pub(super) fn by_products(exchange: Exchange, problem: &Problem, on_cpu: bool) -> Result<bool> {
     let given = problem.bodies.iter().any(|b| b.added_mass.is_some());
     let without = [
-        (!problem.walls.is_empty(), "rigid walls and free surfaces"),
         (given, "given added masses"),
         (!problem.changes.is_empty(), "shape parameters"),
         (!on_cpu, "the backend gpu"),
@@ -28,7 +23,7 @@ pub(super) fn by_products(
     let refused = without.into_iter().find(|(there, _)| *there);
     match (exchange, refused) {
         (Exchange::Factor, _) | (Exchange::Auto, Some(_)) => Ok(false),
-        (Exchange::Auto, None) => Ok(steps && problem.bodies.len() >= MANY),
+        (Exchange::Auto, None) => Ok(faster(problem.bodies.len(), problem.walls.len())),
         (Exchange::Products, None) => Ok(true),
         (Exchange::Products, Some((_, what))) => Err(Error::Unsupported {
             what: format!("exchange by products with {what}"),
@@ -41,7 +36,7 @@ pub(super) fn by_products(
 /// The bodies coupled by products.
 ///
 /// # Errors
-/// An accuracy out of range.
+/// An accuracy out of range, or walls that aren't perpendicular to each other.
 pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Result<Scattering> {
     let names = problem.bodies.iter().map(|b| b.name.to_string()).collect();
     let numerics = problem.numerics;
@@ -51,5 +46,6 @@ pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Resu
         false => numerics.accuracy,
     };
     let levels = Levels::for_accuracy(aim)?;
-    Scattering::new(made, names, problem.start, levels)?.excluding(&problem.excluded)
+    let images = Image::of_walls(problem.walls)?;
+    Scattering::between(made, names, problem.start, images, levels)?.excluding(&problem.excluded)
 }

@@ -5,6 +5,7 @@ use crate::support::heap::{Heap, heap};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Scene, Spring};
+use hydrograd::simulate::Exchange;
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator, objective};
 use nalgebra::DVector;
 
@@ -112,6 +113,47 @@ fn sparse_gradients_hold() {
             .into_iter()
             .fold(1.0, f64::min);
         println!("{integrator:?}: {best:.1e}");
+        assert!(best < 1e-6, "{integrator:?}: {best}");
+    }
+}
+
+/// Bodies that touch each other and the floor in water that couples them, by products: as by the factor within the accuracy, with gradients of their own.
+#[test]
+fn products_are_as_the_factor() {
+    for integrator in CONTACT_INTEGRATORS {
+        let scene = thrown(6);
+        let make = |exchange| {
+            let settings = Settings::default()
+                .fidelity(Fidelity::Reduced)
+                .exchange(exchange)
+                .films(false)
+                .accuracy(0.01)
+                .integrator(integrator);
+            Simulator::new(&scene, settings).unwrap()
+        };
+        let steps = 24;
+        let products = make(Exchange::Products);
+        let [a, b] = [&products, &make(Exchange::Factor)].map(|s| run(s, steps));
+        let pressed: usize = (0..steps).map(|n| a.contacts(n, 0.0).unwrap().len()).sum();
+        assert!(pressed > 3, "{pressed}");
+        let [x, y] = [&a, &b].map(|r| &r.samples()[steps].v - &r.samples()[0].v);
+        let apart = (&x - &y).norm() / y.norm();
+        let goal = objective::final_velocity(5, 0.3, 1.0) + objective::final_velocity(11, 0.2, 0.5);
+        let gradient = a.gradient(&goal).unwrap().initial.v;
+        let mut random = Samples::new(8);
+        let along = DVector::from_vec(random.numbers(gradient.len(), 1.0));
+        let told = gradient.dot(&along);
+        let value = |h: f64| {
+            let mut moved = products.clone();
+            let (q, v) = moved.start();
+            let (q, v) = (q.clone(), v + h * &along);
+            moved.set_start(q, v).unwrap();
+            run(&moved, steps).value(&goal).unwrap()
+        };
+        let error = |h: f64| ((value(h) - value(-h)) / (2.0 * h) - told).abs() / told.abs();
+        let best = error(1e-5);
+        println!("{integrator:?}: {pressed} pressed, {apart:.1e} apart, gradient {best:.1e}");
+        assert!(apart < 0.01, "{integrator:?}: {apart}");
         assert!(best < 1e-6, "{integrator:?}: {best}");
     }
 }

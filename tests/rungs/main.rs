@@ -304,8 +304,12 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::euler::Adjoint::jvp",
     ),
     (
-        "dynamics::integrator::euler::AdjointStage::solve_jvp",
+        "dynamics::integrator::stage_adjoint::AdjointStage::solve_jvp",
         "dynamics::integrator::euler::Adjoint::jvp",
+    ),
+    (
+        "dynamics::integrator::stage_adjoint::AdjointStage::rates_vjp",
+        "dynamics::integrator::euler::Adjoint::vjp",
     ),
     (
         "dynamics::integrator::contact::Adjoint::solve_jvp",

@@ -8,6 +8,7 @@ use hydrograd::coupling::reduced::{Reduced, ReducedBody, compress};
 use hydrograd::coupling::scattering::{Levels, Scattering};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;
+use hydrograd::geometry::Image;
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::Exchange;
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
@@ -255,6 +256,130 @@ fn rollouts_agree_keep_momentum_and_have_gradients() {
     assert!(worst < 1e-6);
 }
 
+/// Between a bed and a free surface that are near: the same columns, and wrenches that are slopes of the energy.
+#[test]
+fn walls_mirror_bodies_as_the_factor_does() {
+    let kinds = kinds(0.01);
+    let mut drawn = Samples::new(7);
+    let poses = grid(&mut drawn, 12, 0.5);
+    // The grid's sides are 2.5 apart; bodies reach out by one, and a little is drawn.
+    let bed = Wall {
+        surface: WallSurface::Rigid,
+        point: [0.0, 0.0, -1.6],
+        normal: [0.0, 0.0, 1.0],
+    };
+    let surface = Wall {
+        surface: WallSurface::Free,
+        point: [0.0, 7.0, 0.0],
+        normal: [0.0, -1.0, 0.0],
+    };
+    let walls = [bed, surface];
+    let bodies: Vec<_> = (0..12).map(|b| kinds[b % 2].clone()).collect();
+    let factor = Reduced::new(bodies.clone(), &walls, |_, _| None).unwrap();
+    let names = (0..12).map(|b| format!("fish {b}")).collect();
+    let images = Image::of_walls(&walls).unwrap();
+    let levels = Levels::for_accuracy(0.01).unwrap();
+    let products = Scattering::between(bodies, names, &poses, images, levels).unwrap();
+    let twists = DMatrix::from_fn(72, 2, |_, _| 0.5 * drawn.number());
+    let columns = |coupling: &dyn Coupling| {
+        coupling
+            .evaluate(&poses, &twists)
+            .unwrap()
+            .momenta()
+            .clone()
+    };
+    let (found, right) = (columns(&products), columns(&factor));
+    let open = Reduced::new(factor.reduced_bodies().to_vec(), &[], |_, _| None).unwrap();
+    let (all, walls_make) = (
+        error(&kinds, &found, &right),
+        error(&kinds, &columns(&open), &right),
+    );
+    println!("columns differ by {all:.1e}, of which walls make {walls_make:.1e}");
+    assert!(all < 0.005 && walls_make > 0.05);
+
+    let one = DVector::from_column_slice(&[1.0, 0.0]);
+    let at = products.linearise(&poses, &twists).unwrap();
+    let z: Vec<Vec6> = (0..12)
+        .map(|_| Vec6::from_fn(|_, _| 0.5 * drawn.number()))
+        .collect();
+    let along = |h: f64| {
+        let moved = poses.iter().zip(&z).map(|(p, z)| p.displace(&(h * z)));
+        let moved: Vec<Pose> = moved.collect();
+        let at = products.linearise(&moved, &twists).unwrap();
+        let wrenches = at.gradient(&one, &one).unwrap();
+        (twists.column(0).dot(&at.momenta().column(0)), wrenches)
+    };
+    let h = 1e-3;
+    let [a, b, c, d] = [h, -h, 2.0 * h, -2.0 * h].map(along);
+    let slope = (8.0 * (a.0 - b.0) - c.0 + d.0) / (12.0 * h);
+    let told: f64 = (at.gradient(&one, &one).unwrap().iter().zip(&z))
+        .map(|(w, z)| w.dot(z))
+        .sum();
+    println!("slope {told:.9e}, by differences {slope:.9e}");
+    assert!((told - slope).abs() < 1e-7 * slope.abs());
+    let x = twists.column(0).into_owned();
+    let tangent = at
+        .hvp(Direction::Twist(&x), Direction::Twist(&x), &z)
+        .unwrap();
+    let size = tangent.wrench.iter().map(Vec6::amax).fold(0.0, f64::max);
+    for (k, found) in tangent.wrench.iter().enumerate() {
+        let by = (8.0 * (a.1[k] - b.1[k]) - c.1[k] + d.1[k]) / (12.0 * h);
+        assert!((found - by).amax() < 1e-6 * size, "body {k}: {found} {by}");
+    }
+}
+
+/// Integrators that solve their stages: products as the factor, beside a wall and in a current, and gradients against differences.
+#[test]
+fn implicit_integrators_agree_and_have_gradients() {
+    let mut scene = swarm(5, 0.5, 1300.0);
+    scene.fluid.current = [0.1, 0.05, 0.0];
+    scene.add_wall([0.0, 0.0, -0.17], [0.0, 0.0, 1.0]);
+    let steps = 2;
+    for integrator in [
+        Integrator::MomentumEuler,
+        Integrator::EnergyEuler,
+        Integrator::Midpoint,
+        Integrator::VelocityEuler,
+    ] {
+        let [products, factor] = [Exchange::Products, Exchange::Factor].map(|exchange| {
+            let simulator = Simulator::new(&scene, settings(exchange, integrator)).unwrap();
+            let controls = Controls::zeros(&simulator, steps);
+            simulator.rollout(&controls).unwrap()
+        });
+        let change = |r: &hydrograd::Rollout| &r.samples()[steps].v - &r.samples()[0].v;
+        let (found, right) = (change(&products), change(&factor));
+        let error = (&found - &right).norm() / right.norm();
+        let last = &products.samples()[steps].v;
+        let mut drawn = Samples::new(4);
+        let weights = DVector::from_fn(last.len(), |_, _| 0.5 * drawn.number());
+        let target = |i: usize| objective::final_velocity(i, last[i] - 0.5, weights[i]);
+        let loss = (1..weights.len()).fold(target(0), |sum, i| sum + target(i));
+        let gradient = products.gradient(&loss).unwrap().initial;
+        let along = DVector::from_fn(last.len(), |_, _| 0.5 * drawn.number());
+        let start = products.simulator();
+        // Where and how fast they start at once.
+        let value = |h: f64| {
+            let mut moved = start.clone();
+            let (q, v) = moved.start();
+            let q = start.system().tree.integrate(q, &(0.01 * h * &along));
+            let v = v + h * &along;
+            moved.set_start(q, v).unwrap();
+            let rollout = moved.rollout(&Controls::zeros(&moved, steps)).unwrap();
+            weights.dot(&rollout.samples()[steps].v)
+        };
+        let told = (&gradient.v + 0.01 * &gradient.q).dot(&along);
+        let h = 1e-3;
+        let sides = |h: f64| value(h) - value(-h);
+        let by = (8.0 * sides(h) - sides(2.0 * h)) / (12.0 * h);
+        let worst = (told - by).abs() / by.abs();
+        println!(
+            "{integrator:?}: accelerations differ by {error:.1e}, gradients from differences by {worst:.1e}"
+        );
+        assert!(error < 0.01, "{integrator:?}: {error}");
+        assert!(worst < 1e-6, "{integrator:?}: {worst}");
+    }
+}
+
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     // So many that all sums are cut into parts.
@@ -314,13 +439,19 @@ fn chains_with_driven_joints_and_excluded_pairs_agree() {
 #[test]
 fn what_isnt_there_is_refused_by_name() {
     let mut scene = swarm(2, 1.0, 1200.0);
-    scene.walls.push(Wall {
-        surface: WallSurface::Rigid,
-        point: [0.0, 0.0, -1.0],
-        normal: [0.0, 0.0, 1.0],
-    });
+    let given =
+        DMatrix::from_diagonal(&DVector::from_column_slice(&[3.0, 3.0, 3.0, 0.1, 0.1, 0.1]));
+    scene.bodies[0].added_mass = Some(
+        given
+            .row_iter()
+            .map(|r| r.iter().copied().collect())
+            .collect(),
+    );
     let refused = Simulator::new(&scene, settings(Exchange::Products, Integrator::Rk2));
-    says(refusal(refused), &["walls", "exchange", "factor"]);
+    says(
+        refusal(refused),
+        &["given added masses", "exchange", "factor"],
+    );
     let poses = vec![Pose::identity()];
     let kinds = kinds(0.03);
     let levels = Levels::for_accuracy(0.01).unwrap();

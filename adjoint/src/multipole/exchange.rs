@@ -6,7 +6,8 @@
 //! Σᵢⱼ αᵢ βⱼ / |xᵢ − yⱼ| = Σ_{|k|+|l| ≤ p} Mᵏ (−1)^|l| Nˡ ∂ᵏ⁺ˡ (1/R)
 //! ```
 //!
-//! up to terms of the degree p + 1 in (size of the clouds)/R. The sum over whole degrees turns and moves with the clouds.
+//! up to terms of the degree p + 1 in (size of the clouds)/R. The sum over whole degrees turns and moves with the clouds. As 1/R is harmonic, moments with z above
+//! one are told by others ([`Table`]).
 
 use super::{Arithmetic, Table};
 
@@ -16,15 +17,35 @@ pub fn derivatives<T: Arithmetic>(table: &Table, r: &[T; 3], one_more: bool, out
     let square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
     let inverse = square.inverse();
     out[0] = inverse.root();
-    for n in 1..table.derivatives(one_more) {
+    let degree = table.degree() + usize::from(one_more);
+    for n in 1..(degree + 1) * (degree + 1) {
         let mut sum = T::constant(0.0);
-        for lower in table.once(n) {
+        for lower in table.once.of(n) {
             sum += out[lower.at] * (r[lower.axis] * lower.factor);
         }
-        for lower in table.twice(n) {
+        for lower in table.twice.of(n) {
             sum += out[lower.at] * lower.factor;
         }
         out[n] = sum * inverse;
+    }
+    extend(table, degree, out);
+}
+
+/// Of what is harmonic, the indices with z = 2 from the others.
+#[inline(always)]
+pub(super) fn extend<T: Arithmetic>(table: &Table, degree: usize, out: &mut [T]) {
+    for (at, [a, b]) in table.folds(degree) {
+        out[at] = -(out[a] + out[b]);
+    }
+}
+
+/// Transpose of [`extend`]: what stands at z = 2 goes to the others.
+#[inline(always)]
+pub(super) fn fold<T: Arithmetic>(table: &Table, degree: usize, out: &mut [T]) {
+    for (at, [a, b]) in table.folds(degree) {
+        let x = -out[at];
+        out[a] += x;
+        out[b] += x;
     }
 }
 
@@ -46,18 +67,40 @@ pub fn see<T: Arithmetic>(
     [m, n]: [&[T]; 2],
     [seen_m, seen_n]: [&mut [T]; 2],
 ) {
-    for (k, (m, seen_m)) in m.iter().zip(seen_m.iter_mut()).enumerate() {
-        let (own, mut sum) = (*m * weight, T::constant(0.0));
-        for ((n, seen), at) in n.iter().zip(seen_n.iter_mut()).zip(table.sums(k)) {
-            let d = d[*at as usize];
-            sum += *n * d;
-            *seen += own * d;
+    for degree in 0..=table.degree() {
+        let (range, mut sums) = table.sums(degree);
+        let (m, seen_m) = (&m[range.clone()], &mut seen_m[range]);
+        // Two at once: what n is and sees is loaded and stored half as often.
+        let (mut own, mut seen) = (m.chunks_exact(2), seen_m.chunks_exact_mut(2));
+        for (m, seen_m) in (&mut own).zip(&mut seen) {
+            let (Some(first), Some(second)) = (sums.next(), sums.next()) else {
+                return;
+            };
+            let (own, mut sum) = ([m[0] * weight, m[1] * weight], [T::constant(0.0); 2]);
+            let each = n.iter().zip(seen_n.iter_mut());
+            for ((n, seen), (i, j)) in each.zip(first.iter().zip(second)) {
+                let d = [d[*i as usize], d[*j as usize]];
+                sum[0] += *n * d[0];
+                sum[1] += *n * d[1];
+                *seen += own[0] * d[0] + own[1] * d[1];
+            }
+            seen_m[0] += sum[0] * weight;
+            seen_m[1] += sum[1] * weight;
         }
-        *seen_m += sum * weight;
+        let last = own.remainder().iter().zip(seen.into_remainder());
+        for ((m, seen_m), at) in last.zip(sums) {
+            let (own, mut sum) = (*m * weight, T::constant(0.0));
+            for ((n, seen), at) in n.iter().zip(seen_n.iter_mut()).zip(at) {
+                let d = d[*at as usize];
+                sum += *n * d;
+                *seen += own * d;
+            }
+            *seen_m += sum * weight;
+        }
     }
 }
 
-/// The energy of two clouds and its gradient in R, from derivatives to one more degree; `both` is room for as many numbers as there are moments.
+/// The energy of two clouds and its gradient in R, from derivatives to one more degree; `both` is room for as many numbers as derivatives.
 #[inline(always)]
 pub fn energy<T: Arithmetic>(
     table: &Table,
@@ -66,11 +109,15 @@ pub fn energy<T: Arithmetic>(
     both: &mut [T],
 ) -> (T, [T; 3]) {
     both.fill(T::constant(0.0));
-    for (k, m) in m.iter().enumerate() {
-        for (n, at) in n.iter().zip(table.sums(k)) {
-            both[*at as usize] += *m * *n;
+    for degree in 0..=table.degree() {
+        let (range, sums) = table.sums(degree);
+        for (m, sums) in m[range].iter().zip(sums) {
+            for (n, at) in n.iter().zip(sums) {
+                both[*at as usize] += *m * *n;
+            }
         }
     }
+    fold(table, table.degree(), both);
     let (mut energy, mut slope) = (T::constant(0.0), [T::constant(0.0); 3]);
     for ((c, d_own), higher) in both.iter().zip(d.iter()).zip(&table.higher) {
         energy += *c * *d_own;

@@ -1,19 +1,18 @@
 //! Moments of charges about a centre, and moved to another.
 
+use super::exchange::{extend, fold};
 use super::{Arithmetic, Table};
 
-/// The monomials aᵏ/k!, moments of a unit charge at `a` from the centre.
+/// The moments of a unit charge at `a` from the centre: the monomials aᵏ/k!, those with z above one told by the others.
 #[inline(always)]
 pub fn monomials<T: Arithmetic>(table: &Table, a: &[T; 3], out: &mut [T]) {
     out[0] = T::constant(1.0);
-    for (k, lower) in table
-        .monomial
-        .iter()
-        .enumerate()
-        .take(table.moments())
-        .skip(1)
-    {
-        out[k] = out[lower.at] * a[lower.axis] * lower.factor;
+    for k in 1..table.moments() {
+        let mut sum = T::constant(0.0);
+        for lower in table.monomial.of(k) {
+            sum += out[lower.at] * a[lower.axis] * lower.factor;
+        }
+        out[k] = sum * table.inverse[k];
     }
 }
 
@@ -36,47 +35,82 @@ pub fn potential<T: Arithmetic>(monomials: &[T], local: &[T]) -> T {
 #[inline(always)]
 pub fn potential_gradient<T: Arithmetic>(table: &Table, monomials: &[T], local: &[T]) -> [T; 3] {
     let mut out = [T::constant(0.0); 3];
-    for (l, lower) in local.iter().zip(&table.lower) {
-        for (out, lower) in out.iter_mut().zip(lower) {
-            if let Some(at) = lower {
-                *out += *l * monomials[*at as usize];
-            }
+    for (k, l) in local.iter().enumerate() {
+        for lower in table.monomial.of(k) {
+            out[lower.axis] += *l * monomials[lower.at] * lower.factor;
         }
     }
     out
 }
 
-/// Adds moments about a centre to those about another, from which it is a shift with these `monomials` away.
-pub fn shift<T: Arithmetic>(table: &Table, monomials: &[T], from: &[T], out: &mut [T]) {
+/// Adds moments about a centre to those about another, from which it is a shift with these `monomials` away; `room` is for as many numbers as
+/// there are derivatives.
+#[inline(always)]
+pub fn shift<T: Arithmetic>(
+    table: &Table,
+    monomials: &[T],
+    from: &[T],
+    out: &mut [T],
+    room: &mut [T],
+) {
     // M'ₖ₊ₗ += Mₖ sˡ/l!
-    for (k, m) in from.iter().enumerate() {
-        for (s, at) in monomials.iter().zip(table.sums(k)) {
-            out[*at as usize] += *m * *s;
+    room.fill(T::constant(0.0));
+    for degree in 0..=table.degree() {
+        let (range, sums) = table.sums(degree);
+        for (m, sums) in from[range].iter().zip(sums) {
+            for (s, at) in monomials.iter().zip(sums) {
+                room[*at as usize] += *m * *s;
+            }
         }
+    }
+    fold(table, table.degree(), room);
+    for (out, x) in out.iter_mut().zip(room) {
+        *out += *x;
     }
 }
 
 /// Transpose of [`shift`] in the moments: adds coefficients about the other centre, `bar`, to those about the first.
-pub fn shift_back<T: Arithmetic>(table: &Table, monomials: &[T], bar: &[T], out: &mut [T]) {
-    for (k, out) in out.iter_mut().enumerate() {
-        for (s, at) in monomials.iter().zip(table.sums(k)) {
-            *out += bar[*at as usize] * *s;
+#[inline(always)]
+pub fn shift_back<T: Arithmetic>(
+    table: &Table,
+    monomials: &[T],
+    bar: &[T],
+    out: &mut [T],
+    room: &mut [T],
+) {
+    room[..bar.len()].copy_from_slice(bar);
+    extend(table, table.degree(), room);
+    for degree in 0..=table.degree() {
+        let (range, sums) = table.sums(degree);
+        for (out, sums) in out[range].iter_mut().zip(sums) {
+            let mut sum = *out;
+            for (s, at) in monomials.iter().zip(sums) {
+                sum += room[*at as usize] * *s;
+            }
+            *out = sum;
         }
     }
 }
 
 /// The gradient in the shift of the moments' product with `bar`.
+#[inline(always)]
 pub fn shift_gradient<T: Arithmetic>(
     table: &Table,
     monomials: &[T],
     from: &[T],
     bar: &[T],
+    room: &mut [T],
 ) -> [T; 3] {
+    room[..bar.len()].copy_from_slice(bar);
+    extend(table, table.degree(), room);
     // The product is Σₗ cₗ sˡ/l!.
     let mut local = vec![T::constant(0.0); from.len()];
-    for (k, m) in from.iter().enumerate() {
-        for (c, at) in local.iter_mut().zip(table.sums(k)) {
-            *c += *m * bar[*at as usize];
+    for degree in 0..=table.degree() {
+        let (range, sums) = table.sums(degree);
+        for (m, sums) in from[range].iter().zip(sums) {
+            for (c, at) in local.iter_mut().zip(sums) {
+                *c += *m * room[*at as usize];
+            }
         }
     }
     potential_gradient(table, monomials, &local)

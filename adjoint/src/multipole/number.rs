@@ -6,6 +6,24 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 /// Numbers side by side.
 pub const WIDTH: usize = 8;
 
+/// Whether 1/√x may begin in single precision. By the bits, which are in the order of the numbers: without a branch, which would take vectors apart.
+#[inline(always)]
+fn usable(x: f32) -> bool {
+    const LOW: u32 = 1e-37_f32.to_bits();
+    const HIGH: u32 = 1e37_f32.to_bits();
+    x.to_bits().wrapping_sub(LOW) <= HIGH - LOW
+}
+
+/// 1/√x from single precision by two of Newton's steps: less than half of a root and a quotient.
+#[inline(always)]
+fn by_newton(x: f64) -> f64 {
+    let half = 0.5 * x;
+    let mut y = f64::from(1.0 / (x as f32).sqrt());
+    y *= 1.5 - half * y * y;
+    y *= 1.5 - half * y * y;
+    y
+}
+
 /// What sums need of numbers.
 pub trait Arithmetic:
     Copy
@@ -42,6 +60,10 @@ pub trait Number: Arithmetic + PartialEq + Send + Sync {
     fn value(self) -> f64;
     /// xⁿ.
     fn power(self, n: i32) -> Self;
+    /// The inverse distances of a point from others, given by their coordinates, if these numbers have loops of their own for them.
+    fn inverse_distances(_from: &[Self; 3], _to: [&[Self]; 3], _out: &mut [Self]) -> bool {
+        false
+    }
 }
 
 /// Plain numbers side by side.
@@ -98,6 +120,22 @@ impl Number for f64 {
     }
     fn power(self, n: i32) -> f64 {
         self.powi(n)
+    }
+    #[inline(always)]
+    fn inverse_distances(from: &[f64; 3], [x, y, z]: [&[f64]; 3], out: &mut [f64]) -> bool {
+        for (((out, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
+            let way = [from[0] - x, from[1] - y, from[2] - z];
+            *out = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+        }
+        let mut outside = 0;
+        for x in out.iter() {
+            outside |= u32::from(!usable(*x as f32));
+        }
+        match outside {
+            0 => out.iter_mut().for_each(|x| *x = by_newton(*x)),
+            _ => out.iter_mut().for_each(|x| *x = 1.0 / x.sqrt()),
+        }
+        true
     }
 }
 
@@ -222,19 +260,14 @@ impl Arithmetic for Pack {
     }
     #[inline(always)]
     fn inverse_root(self) -> Self {
-        // From single precision by two of Newton's steps: less than half of a root and a quotient.
-        let single = self.0.map(|x| x as f32);
-        let first = single.map(|x| 1.0 / x.sqrt());
-        let usable = single.iter().all(|x| (1e-37..1e37).contains(x));
-        if !usable {
-            return self.root().inverse();
+        let mut outside = 0;
+        for x in &self.0 {
+            outside |= u32::from(!usable(*x as f32));
         }
-        let mut y = Self(first.map(f64::from));
-        let half = self * 0.5;
-        for _ in 0..2 {
-            y = y * (Self::constant(1.5) - half * y * y);
+        match outside {
+            0 => Self(self.0.map(by_newton)),
+            _ => self.root().inverse(),
         }
-        y
     }
 }
 

@@ -1,9 +1,12 @@
-//! Multi-indices (i, j, k) of monomials and derivatives up to a degree, and which of them add up to which.
+//! Multi-indices (i, j, z) of moments and derivatives up to a degree, and which of them add up to which.
+//!
+//! Potentials are harmonic: ∂z² is −∂x² − ∂y², so that of each degree d the 2d + 1 indices with z below two tell all others. Sums of two of them have a z up to
+//! two; those with two stand behind the others.
 
 /// Highest degree: numbers of derivatives of one more fit into the indices, and the products of all into a few hundred kB.
 pub const MOST: usize = 12;
 
-/// The next lower of a multi-index along one axis: where it stands, and by how much its entry counts.
+/// What a multi-index follows from: where that stands, which coordinate comes in, and with which factor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lower {
     pub at: usize,
@@ -11,131 +14,156 @@ pub(super) struct Lower {
     pub factor: f64,
 }
 
+/// Of each multi-index what it follows from.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lowers {
+    all: Vec<Lower>,
+    ends: Vec<u32>,
+}
+
+impl Lowers {
+    fn push(&mut self, lowers: impl Iterator<Item = Lower>) {
+        self.all.extend(lowers);
+        self.ends.push(self.all.len() as u32);
+    }
+
+    #[inline(always)]
+    pub fn of(&self, n: usize) -> &[Lower] {
+        let start = n.checked_sub(1).map_or(0, |last| self.ends[last] as usize);
+        &self.all[start..self.ends[n] as usize]
+    }
+}
+
 /// Multi-indices in the order of their degree.
 #[derive(Clone, Debug)]
 pub struct Table {
     degree: usize,
-    index: Vec<[usize; 3]>,
-    /// Numbers of multi-indices of degrees under each.
-    counts: Vec<usize>,
-    /// Of the monomial aᵏ/k!: the one that it is a multiple of, by a factor times a coordinate.
-    pub(super) monomial: Vec<Lower>,
-    /// Of each derivative of 1/r those that it follows from: factors of coordinate times the next lower, and of those two lower.
-    lowers: Vec<Lower>,
-    /// Where those of each begin among `lowers`, and where those of two lower do.
-    ways: Vec<[u32; 3]>,
+    /// Of (a·∂)ᵈ/d!, the moments of a unit charge: d times each is Σ factor · coordinate · lower.
+    pub(super) monomial: Lowers,
+    /// Of each derivative of 1/r: factors of coordinate times the next lower, and of those two lower.
+    pub(super) once: Lowers,
+    pub(super) twice: Lowers,
     /// Of each k of degree d, for the l up to the degree left: where k + l stands, one after the other.
     sums: Vec<u16>,
-    /// Where those of each begin.
-    sums_from: Vec<u32>,
-    /// Of each k the one lower along each axis.
-    pub(super) lower: Vec<[Option<u16>; 3]>,
-    /// Of each k the one higher along each axis; up to one degree less.
+    /// Where those of each degree begin.
+    sums_from: Vec<usize>,
+    /// The two that each index with z = 2 is minus the sum of, by degree.
+    folds: Vec<[u16; 2]>,
+    /// Of each index, those with z = 2 left out, the one higher along each axis; up to one degree less.
     pub(super) higher: Vec<[u16; 3]>,
     /// (−1)^|k|
     pub(super) sign: Vec<f64>,
+    /// 1/d of each index.
+    pub(super) inverse: Vec<f64>,
 }
 
 impl Table {
     /// Moments up to `degree`, at most [`MOST`], and derivatives up to one more.
     pub fn new(degree: usize) -> Self {
         let degree = degree.min(MOST);
-        let (mut index, mut counts) = (Vec::new(), vec![0]);
-        for d in 0..=degree + 1 {
-            for i in (0..=d).rev() {
-                index.extend((0..=d - i).rev().map(|j| [i, j, d - i - j]));
-            }
-            counts.push(index.len());
-        }
+        let size = |k: &[usize; 3]| k[0] + k[1] + k[2];
+        let last = degree + 1;
+        let behind = (last + 1) * (last + 1);
         let place = |k: [usize; 3]| -> usize {
-            let d = k[0] + k[1] + k[2];
-            let rest = d - k[0];
-            counts[d] + rest * (rest + 1) / 2 + k[2]
+            let d = size(&k);
+            match k[2] {
+                2 => behind + (d - 1) * (d - 2) / 2 + k[1],
+                z => d * d + z * (d + 1) + k[1],
+            }
         };
+        let index: Vec<[usize; 3]> = (0..=last)
+            .flat_map(|d| (0..2.min(d + 1)).map(move |z| (d, z)))
+            .flat_map(|(d, z)| (0..=d - z).map(move |j| [d - z - j, j, z]))
+            .collect();
+        let moments = (degree + 1) * (degree + 1);
         let down = |k: &[usize; 3], axis: usize, by: usize| {
             let mut k = *k;
             k[axis] = k[axis].checked_sub(by)?;
             Some(place(k))
         };
-        let size = |k: &[usize; 3]| k[0] + k[1] + k[2];
-        let monomial = |k: &[usize; 3]| {
-            let axis = (0..3).find(|a| k[*a] > 0).unwrap_or(0);
-            Lower {
-                at: down(k, axis, 1).unwrap_or(0),
-                axis,
-                factor: 1.0 / k[axis].max(1) as f64,
-            }
-        };
-        let once = |k: &[usize; 3]| -> Vec<Lower> {
-            let m = size(k).max(1) as f64;
-            let of = |axis: usize| {
-                let factor = -(2.0 * m - 1.0) / m * k[axis] as f64;
-                down(k, axis, 1).map(|at| Lower { at, axis, factor })
-            };
-            (0..3).filter_map(of).collect()
-        };
-        let twice = |k: &[usize; 3]| -> Vec<Lower> {
-            let m = size(k).max(1) as f64;
-            let of = |axis: usize| {
-                let n = k[axis] as f64;
-                let factor = -(m - 1.0) / m * n * (n - 1.0);
-                down(k, axis, 2).map(|at| Lower { at, axis, factor })
-            };
-            (0..3).filter_map(of).collect()
-        };
-        let up = |k: &[usize; 3], l: &[usize; 3]| place([k[0] + l[0], k[1] + l[1], k[2] + l[2]]);
-        let moments = counts[degree + 1];
-        let sums = |k: &[usize; 3]| -> Vec<u16> {
-            let left = counts[degree + 1 - size(k)];
-            index[..left].iter().map(|l| up(k, l) as u16).collect()
-        };
-        let (mut lowers, mut ways) = (Vec::new(), Vec::new());
-        for k in &index {
-            let first = lowers.len() as u32;
-            lowers.extend(once(k));
-            let middle = lowers.len() as u32;
-            lowers.extend(twice(k));
-            ways.push([first, middle, lowers.len() as u32]);
-        }
-        let (mut all_sums, mut sums_from) = (Vec::new(), vec![0]);
-        for k in &index[..moments] {
-            all_sums.extend(sums(k));
-            sums_from.push(all_sums.len() as u32);
-        }
-        Self {
-            monomial: index.iter().map(monomial).collect(),
-            lowers,
-            ways,
-            sums: all_sums,
-            sums_from,
-            lower: (index.iter())
-                .map(|k| [0, 1, 2].map(|axis| down(k, axis, 1).map(|at| at as u16)))
-                .collect(),
-            higher: (index[..moments].iter())
-                .map(|k| [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|e| up(k, &e) as u16))
-                .collect(),
+        let mut out = Self {
+            degree,
+            monomial: Lowers::default(),
+            once: Lowers::default(),
+            twice: Lowers::default(),
+            sums: Vec::new(),
+            sums_from: vec![0],
+            folds: Vec::new(),
+            higher: Vec::new(),
             sign: (index.iter())
                 .map(|k| if size(k) % 2 == 0 { 1.0 } else { -1.0 })
                 .collect(),
-            degree,
-            index,
-            counts,
+            inverse: index.iter().map(|k| 1.0 / size(k).max(1) as f64).collect(),
+        };
+        for k in &index {
+            let m = size(k).max(1) as f64;
+            let along = |axis: usize, factor: f64, at: Option<usize>| {
+                at.map(|at| Lower { at, axis, factor })
+            };
+            let plain = (0..3).filter_map(|axis| along(axis, 1.0, down(k, axis, 1)));
+            // z times an index with z = 1 is minus those with two more along x and y.
+            let turned = (0..2).filter_map(|axis| {
+                let at = match k[2] {
+                    0 if k[axis] > 1 => {
+                        let mut lower = *k;
+                        (lower[axis], lower[2]) = (k[axis] - 2, 1);
+                        Some(place(lower))
+                    }
+                    _ => None,
+                };
+                along(2, -1.0, at)
+            });
+            out.monomial.push(plain.chain(turned));
+            out.once.push((0..3).filter_map(|axis| {
+                let factor = -(2.0 * m - 1.0) / m * k[axis] as f64;
+                along(axis, factor, down(k, axis, 1))
+            }));
+            out.twice.push((0..3).filter_map(|axis| {
+                let n = k[axis] as f64;
+                let factor = -(m - 1.0) / m * n * (n - 1.0);
+                along(axis, factor, down(k, axis, 2))
+            }));
         }
+        for d in 2..=last {
+            let two = |j: usize| [place([d - j, j, 0]), place([d - 2 - j, j + 2, 0])];
+            let all = (0..d - 1).map(|j| two(j).map(|at| at as u16));
+            out.folds.extend(all);
+        }
+        let up =
+            |k: &[usize; 3], l: &[usize; 3]| place([k[0] + l[0], k[1] + l[1], k[2] + l[2]]) as u16;
+        for d in 0..=degree {
+            let left = degree + 1 - d;
+            for k in &index[d * d..(d + 1) * (d + 1)] {
+                let all = index[..left * left].iter().map(|l| up(k, l));
+                out.sums.extend(all);
+            }
+            out.sums_from.push(out.sums.len());
+        }
+        out.higher = (index[..moments].iter())
+            .map(|k| [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(|e| up(k, &e)))
+            .collect();
+        out
     }
 
+    /// For the k of degree `d`, which stand one after the other: where each one's sums with all l up to the degree left stand.
     #[inline(always)]
-    pub(super) fn once(&self, n: usize) -> &[Lower] {
-        &self.lowers[self.ways[n][0] as usize..self.ways[n][1] as usize]
+    pub(super) fn sums(
+        &self,
+        d: usize,
+    ) -> (std::ops::Range<usize>, std::slice::ChunksExact<'_, u16>) {
+        let left = self.degree + 1 - d;
+        let all = &self.sums[self.sums_from[d]..self.sums_from[d + 1]];
+        (d * d..(d + 1) * (d + 1), all.chunks_exact(left * left))
     }
 
+    /// Indices with z = 2 up to a degree, each with the two that it is minus the sum of.
     #[inline(always)]
-    pub(super) fn twice(&self, n: usize) -> &[Lower] {
-        &self.lowers[self.ways[n][1] as usize..self.ways[n][2] as usize]
-    }
-
-    #[inline(always)]
-    pub(super) fn sums(&self, k: usize) -> &[u16] {
-        &self.sums[self.sums_from[k] as usize..self.sums_from[k + 1] as usize]
+    pub(super) fn folds(&self, degree: usize) -> impl Iterator<Item = (usize, [usize; 2])> {
+        let behind = (self.degree + 2) * (self.degree + 2);
+        let all = self.folds[..degree * degree.saturating_sub(1) / 2].iter();
+        let both = |pair: &[u16; 2]| pair.map(usize::from);
+        all.enumerate()
+            .map(move |(i, pair)| (behind + i, both(pair)))
     }
 
     /// Highest degree of moments.
@@ -145,21 +173,16 @@ impl Table {
 
     /// Number of moments.
     pub fn moments(&self) -> usize {
-        self.counts[self.degree + 1]
+        (self.degree + 1) * (self.degree + 1)
     }
 
-    /// Number of derivatives of 1/r up to the degree, and up to one more.
-    pub fn derivatives(&self, one_more: bool) -> usize {
-        self.counts[self.degree + 1 + usize::from(one_more)]
+    /// Room for derivatives of 1/r up to one degree more, those with z = 2 among them.
+    pub fn derivatives(&self) -> usize {
+        (self.degree + 2) * (self.degree + 2) + self.folds.len()
     }
 
     /// (−1)^|k| of each multi-index.
     pub fn signs(&self) -> &[f64] {
         &self.sign
-    }
-
-    /// The multi-indices, those of the moments first.
-    pub fn index(&self) -> &[[usize; 3]] {
-        &self.index
     }
 }

@@ -14,6 +14,15 @@ pub(super) struct Cell {
     pub count: usize,
 }
 
+/// A cell to be made.
+struct Waiting {
+    first: usize,
+    count: usize,
+    parent: usize,
+    /// How many groups it holds; none of a part of one.
+    groups: usize,
+}
+
 /// Cells, each before its halves. Which bodies lie in which is decided once, from where they are at the start, so that the energy stays a smooth function of their places
 /// as these change.
 #[derive(Clone, Debug)]
@@ -22,33 +31,40 @@ pub(super) struct Cells {
     pub order: Vec<usize>,
     /// The cell of each body alone.
     pub leaf: Vec<usize>,
+    /// That of all bodies of each group.
+    pub roots: Vec<usize>,
 }
 
 impl Cells {
-    /// Of bodies about these centres, halved across the longest side.
-    pub fn new(centres: &[Vec3]) -> Self {
+    /// Of bodies about these centres, halved across the longest side, each of so many equal `groups` by itself.
+    pub fn new(centres: &[Vec3], groups: usize) -> Self {
         let mut out = Self {
             cells: Vec::with_capacity(2 * centres.len()),
             order: (0..centres.len()).collect(),
             leaf: vec![0; centres.len()],
+            roots: Vec::with_capacity(groups),
         };
         if !centres.is_empty() {
-            let mut waiting = vec![(0, centres.len(), 0)];
-            while let Some((first, count, parent)) = waiting.pop() {
-                out.add(centres, first, count, parent, &mut waiting);
+            let mut waiting = vec![Waiting {
+                first: 0,
+                count: centres.len(),
+                parent: 0,
+                groups,
+            }];
+            while let Some(next) = waiting.pop() {
+                out.add(centres, next, &mut waiting);
             }
         }
         out
     }
 
-    fn add(
-        &mut self,
-        centres: &[Vec3],
-        first: usize,
-        count: usize,
-        parent: usize,
-        waiting: &mut Vec<(usize, usize, usize)>,
-    ) {
+    fn add(&mut self, centres: &[Vec3], made: Waiting, waiting: &mut Vec<Waiting>) {
+        let Waiting {
+            first,
+            count,
+            parent,
+            groups,
+        } = made;
         let own = self.cells.len();
         // Its parent learns of it: the left half is made right after it.
         if own > 0 {
@@ -64,6 +80,27 @@ impl Cells {
             first,
             count,
         });
+        let mut halve = |half: usize, groups: [usize; 2]| {
+            waiting.push(Waiting {
+                first: first + half,
+                count: count - half,
+                parent: own,
+                groups: groups[1],
+            });
+            waiting.push(Waiting {
+                first,
+                count: half,
+                parent: own,
+                groups: groups[0],
+            });
+        };
+        if groups > 1 {
+            halve(count / groups, [1, groups - 1]);
+            return;
+        }
+        if groups == 1 {
+            self.roots.push(own);
+        }
         let bodies = &mut self.order[first..first + count];
         if let [b] = bodies {
             self.leaf[*b] = own;
@@ -80,9 +117,7 @@ impl Cells {
             let places = centres[*a][axis].total_cmp(&centres[*b][axis]);
             places.then(a.cmp(b))
         });
-        let half = count / 2;
-        waiting.push((first + half, count - half, own));
-        waiting.push((first, half, own));
+        halve(count / 2, [0, 0]);
     }
 
     /// The cells that a body lies in.

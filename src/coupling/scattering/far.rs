@@ -38,8 +38,8 @@ impl<T: Number> Moments<'_, T> {
             seen: vec![T::constant(0.0); self.plain.len()],
             slopes: Vec::with_capacity(if slopes { pairs.len() } else { 0 }),
         };
-        let mut d = vec![zero; table.derivatives(slopes)];
-        let mut room = vec![zero; 5 * n];
+        let mut d = vec![zero; table.derivatives()];
+        let mut room = vec![zero; 4 * n + table.derivatives()];
         let (m, rest) = room.split_at_mut(n);
         let (l, rest) = rest.split_at_mut(n);
         let (seen_m, rest) = rest.split_at_mut(n);
@@ -79,10 +79,13 @@ impl<T: Number> Moments<'_, T> {
                 seen_l.fill(zero);
                 let weight = T::pack(&weights);
                 multipole::see(table, &d, weight, [&*m, &*l], [&mut *seen_m, &mut *seen_l]);
+                for (seen, sign) in seen_l.iter_mut().zip(table.signs()) {
+                    *seen = *seen * *sign;
+                }
                 for (i, pair) in pairs.iter().enumerate() {
                     let own = out.seen[n * pair.cells[1]..][..n].iter_mut();
-                    for ((out, seen), sign) in own.zip(&*seen_l).zip(table.signs()) {
-                        *out += T::lane(seen, i) * *sign;
+                    for (out, seen) in own.zip(&*seen_l) {
+                        *out += T::lane(seen, i);
                     }
                 }
                 if slopes {

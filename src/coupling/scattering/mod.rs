@@ -16,11 +16,15 @@
 //! ```
 //!
 //! whose M̄ is never formed. The energy's gradient is a Coulomb sum of the charges, its derivatives those of the same sums in dual numbers.
+//!
+//! Walls and free surfaces are mirror images of the bodies, with trees of their own, that no image but bodies see: with charges c = [α, ½ σ α] on bodies and their images (σ = −1 of those that are
+//! mirrored in free surfaces an odd number of times) the energy is still ½ cᵀĜc, so that all of the above stays true of it.
 
 mod cells;
 mod far;
 mod levels;
 mod linearised;
+mod mirrors;
 mod near;
 mod pairs;
 mod places;
@@ -32,10 +36,12 @@ pub use linearised::ScatteredLinearised;
 pub use scattered::{Answer, Motions, Recoiled, Scattered};
 
 use super::Exclusions;
+use super::isolated::Isolated;
 use super::reduced::{Link, Reduced, ReducedBody};
 use super::settings::{end, ranges};
 use crate::adjoint::lie::{Mat6, Pose};
 use crate::adjoint::multipole::Table;
+use crate::geometry::Image;
 use crate::{Error, Result};
 use cells::Cells;
 use std::collections::BTreeSet;
@@ -47,11 +53,14 @@ use std::sync::Arc;
 pub struct Scattering {
     bodies: Vec<Arc<ReducedBody>>,
     names: Vec<String>,
-    /// M̄₀ of each.
-    own: Vec<Mat6>,
+    /// The same where they don't feel each other, by M̄₀ of each.
+    alone: Isolated,
+    /// Those that walls make, none being the first.
+    images: Vec<Image>,
+    /// Of the bodies, then of all that mirrors show of them, image by image.
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
-    /// Largest distance of a body's points from its centre, m.
+    /// Largest distance of a body's points from its centre, m; bodies and what mirrors show.
     sizes: Vec<f64>,
     cells: Cells,
     /// Pairs of cells with bodies that don't feel each other.
@@ -70,6 +79,20 @@ impl Scattering {
         bodies: Vec<Arc<ReducedBody>>,
         names: Vec<String>,
         start: &[Pose],
+        levels: Levels,
+    ) -> Result<Self> {
+        Self::between(bodies, names, start, vec![Image::identity()], levels)
+    }
+
+    /// The same with the images that walls make, which begin with none ([`Image::of_walls`]).
+    ///
+    /// # Errors
+    /// As [`Scattering::new`].
+    pub fn between(
+        bodies: Vec<Arc<ReducedBody>>,
+        names: Vec<String>,
+        start: &[Pose],
+        images: Vec<Image>,
         levels: Levels,
     ) -> Result<Self> {
         if [names.len(), start.len()] != [bodies.len(); 2] {
@@ -96,21 +119,27 @@ impl Scattering {
             let reach = parts.points.iter().map(|x| (x - parts.centre).norm());
             reach.fold(0.0, f64::max)
         };
+        let seen = || images.iter().flat_map(|_| &bodies);
+        let shown = images.iter().flat_map(|image| {
+            let centres = centres.iter();
+            centres.map(|c| image.linear * c + image.shift)
+        });
         Ok(Self {
-            own: bodies.iter().map(|b| b.parts().added_mass).collect(),
-            points: ranges(bodies.iter().map(|b| b.points())),
+            alone: Isolated::new(bodies.iter().map(|b| b.parts().added_mass).collect()),
+            points: ranges(seen().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
-            sizes: bodies.iter().map(size).collect(),
-            cells: Cells::new(&centres),
+            sizes: seen().map(size).collect(),
+            cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
             table: Table::new(levels.degree),
             refused: BTreeSet::new(),
+            images,
             names,
             levels,
             bodies,
         })
     }
 
-    /// The same, without the flow between these pairs of bodies.
+    /// The same, without the flow between these pairs of bodies; that of each other's images stays.
     ///
     /// # Errors
     /// A pair that names a body that doesn't exist.
@@ -152,7 +181,12 @@ impl Scattering {
 
     /// The added mass of each body alone, at unit density (body frame, about its origin).
     pub fn own(&self) -> &[Mat6] {
-        &self.own
+        self.alone.added_masses()
+    }
+
+    /// The bodies where they don't feel each other.
+    pub fn alone(&self) -> &Isolated {
+        &self.alone
     }
 
     /// How the exchange is cut into levels.
@@ -160,8 +194,12 @@ impl Scattering {
         &self.levels
     }
 
+    /// Points of the bodies themselves.
     fn point_count(&self) -> usize {
-        end(&self.points)
+        self.bodies
+            .len()
+            .checked_sub(1)
+            .map_or(0, |last| self.points[last].end)
     }
 
     fn mode_count(&self) -> usize {

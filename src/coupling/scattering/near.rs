@@ -51,10 +51,13 @@ impl<T: Number> Charged<'_, T> {
             #[inline(always)]
             || {
                 let mut out = NearPart::zeros(self.charges.len(), forces);
-                let mut other = Vec::new();
+                let (mut other, mut row) = (Vec::new(), Row::new());
                 for near in pairs {
                     if let Some(inverse) = known.and_then(|known| known.of(near.number)) {
                         self.known_pair(near, inverse, &mut out.potentials);
+                        continue;
+                    }
+                    if !forces && self.plain_pair(near, &mut row, &mut out.potentials) {
                         continue;
                     }
                     self.load(near.bodies[1], &mut other);
@@ -107,6 +110,48 @@ impl<T: Number> Charged<'_, T> {
         for (out, seen) in out[b].iter_mut().zip(seen_b) {
             *out += seen * weight;
         }
+    }
+
+    /// A pair of which only potentials are asked for, row by row, if these numbers have loops for it.
+    #[inline(always)]
+    fn plain_pair(&self, near: &Near, row: &mut Row<T>, out: &mut [T]) -> bool {
+        let [a, b] = near.bodies.map(|b| self.points[b].clone());
+        let weight = self.weights.within(near.within);
+        let (count, zero) = (b.len().next_multiple_of(WIDTH), T::constant(0.0));
+        // Beyond the last point it stands again, without a charge.
+        for (own, all) in row.at.iter_mut().zip(&self.places.points) {
+            own.clear();
+            own.extend_from_slice(&all[b.clone()]);
+            own.resize(count, all[b.end - 1]);
+        }
+        row.charges.clear();
+        row.charges.extend_from_slice(&self.charges[b.clone()]);
+        row.charges.resize(count, zero);
+        row.seen.clear();
+        row.seen.resize(count, zero);
+        row.inverse.resize(count, zero);
+        for i in a {
+            let to = [0, 1, 2].map(|k| &row.at[k][..count]);
+            let inverse = &mut row.inverse[..count];
+            if !T::inverse_distances(&self.places.point(i), to, inverse) {
+                return false;
+            }
+            let own = self.charges[i];
+            let mut lanes = [zero; WIDTH];
+            let each = inverse.chunks_exact(WIDTH);
+            let seen = row.seen.chunks_exact_mut(WIDTH);
+            for ((inverse, seen), others) in each.zip(seen).zip(row.charges.chunks_exact(WIDTH)) {
+                for k in 0..WIDTH {
+                    seen[k] += own * inverse[k];
+                    lanes[k] += others[k] * inverse[k];
+                }
+            }
+            out[i] += T::sum(&T::pack(&lanes)) * weight;
+        }
+        for (out, seen) in out[b].iter_mut().zip(&row.seen) {
+            *out += *seen * weight;
+        }
+        true
     }
 
     #[inline(always)]
@@ -162,6 +207,26 @@ impl<T: Number> Charged<'_, T> {
             }
         }
         energy
+    }
+}
+
+/// The second body of a pair, filled up to eights: its points, charges, what they see, and inverse distances from one of the first's.
+struct Row<T> {
+    at: [Vec<T>; 3],
+    charges: Vec<T>,
+    seen: Vec<T>,
+    inverse: Vec<T>,
+}
+
+impl<T> Row<T> {
+    fn new() -> Self {
+        let none = Vec::new;
+        Self {
+            at: [none(), none(), none()],
+            charges: none(),
+            seen: none(),
+            inverse: none(),
+        }
     }
 }
 

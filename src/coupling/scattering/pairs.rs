@@ -55,7 +55,11 @@ impl Pairs {
         if cells.cells.is_empty() {
             return out;
         }
-        let mut waiting = vec![([0, 0], None)];
+        // No image sees another.
+        let bodies = cells.roots[0];
+        let mut waiting: Vec<_> = (cells.roots.iter())
+            .map(|root| ([bodies, *root], None))
+            .collect();
         while let Some(([a, b], within)) = waiting.pop() {
             let (left, right) = (&cells.cells[a], &cells.cells[b]);
             if a == b {

@@ -1,11 +1,11 @@
 //! Where everything is: points, bodies' centres, cells with their sizes.
 
+use super::Scattering;
 use super::cells::Cells;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, point_velocity};
 use crate::adjoint::multipole::{Arithmetic, Number};
-use crate::coupling::reduced::ReducedBody;
+use crate::geometry::Image;
 use num_dual::Dual64;
-use std::sync::Arc;
 
 /// A vector of numbers that may carry derivatives.
 pub(super) type Triple<T> = [T; 3];
@@ -53,38 +53,45 @@ pub(super) struct Places<T> {
 const POWER: i32 = 64;
 
 impl Places<f64> {
-    pub fn new(bodies: &[Arc<ReducedBody>], sizes: &[f64], cells: &Cells, poses: &[Pose]) -> Self {
-        let of = |x: Vec3| [x.x, x.y, x.z];
-        let at = bodies.iter().zip(poses);
-        let points = at.clone().flat_map(|(body, pose)| {
-            let own = body.parts().points.iter();
-            own.map(move |x| of(pose.apply(x)))
-        });
-        let centres = at.map(|(body, pose)| of(pose.apply(&body.parts().centre)));
-        Self::of(apart(points), &centres.collect::<Vec<_>>(), sizes, cells)
+    /// Of bodies and of what mirrors show of them.
+    pub fn new(model: &Scattering, poses: &[Pose]) -> Self {
+        Self::shown(model, poses, |_, _, x| [x.x, x.y, x.z])
     }
 }
 
 impl Places<Dual64> {
     /// The same as each body is displaced by a spatial twist.
-    pub fn moving(
-        bodies: &[Arc<ReducedBody>],
-        sizes: &[f64],
-        cells: &Cells,
-        poses: &[Pose],
-        z: &[Vec6],
-    ) -> Self {
-        let of = |x: Vec3, z: &Vec6| {
-            let rate = point_velocity(z, &x);
+    pub fn moving(model: &Scattering, poses: &[Pose], z: &[Vec6]) -> Self {
+        Self::shown(model, poses, |image, b, x| {
+            let rate = point_velocity(&image.twist(&z[b]), &x);
             [0, 1, 2].map(|i| Dual64::new(x[i], rate[i]))
-        };
-        let at = bodies.iter().zip(poses).zip(z);
-        let points = at.clone().flat_map(|((body, pose), z)| {
-            let own = body.parts().points.iter();
-            own.map(move |x| of(pose.apply(x), z))
-        });
-        let centres = at.map(|((body, pose), z)| of(pose.apply(&body.parts().centre), z));
-        Self::of(apart(points), &centres.collect::<Vec<_>>(), sizes, cells)
+        })
+    }
+}
+
+impl<T: Number> Places<T> {
+    /// From what becomes of each place of an image of a body.
+    fn shown(
+        model: &Scattering,
+        poses: &[Pose],
+        of: impl Fn(&Image, usize, Vec3) -> Triple<T>,
+    ) -> Self {
+        let count = model.points.last().map_or(0, |last| last.end);
+        let mut points = [0; 3].map(|_| Vec::with_capacity(count));
+        let mut centres = Vec::with_capacity(model.points.len());
+        for image in &model.images {
+            for (b, (body, pose)) in model.bodies.iter().zip(poses).enumerate() {
+                let parts = body.parts();
+                let placed = |x: &Vec3| of(image, b, image.linear * pose.apply(x) + image.shift);
+                for own in &parts.points {
+                    for (out, x) in points.iter_mut().zip(placed(own)) {
+                        out.push(x);
+                    }
+                }
+                centres.push(placed(&parts.centre));
+            }
+        }
+        Self::of(points, &centres, &model.sizes, &model.cells)
     }
 }
 
@@ -180,17 +187,6 @@ impl<T: Number> Places<T> {
         }
         out
     }
-}
-
-/// Vectors as their three coordinates, each by itself.
-fn apart<T: Number>(vectors: impl Iterator<Item = Triple<T>>) -> [Vec<T>; 3] {
-    let mut out = [Vec::new(), Vec::new(), Vec::new()];
-    for x in vectors {
-        for (out, x) in out.iter_mut().zip(x) {
-            out.push(x);
-        }
-    }
-    out
 }
 
 /// |x|, zero without a slope at zero.

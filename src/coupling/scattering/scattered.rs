@@ -3,10 +3,11 @@
 use super::Scattering;
 use super::near::Distances;
 use super::pairs::{Near, Pairs};
-use super::places::Places;
+use super::places::{Places, length, minus};
 use super::sums::{Gradient, Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::coupling::CouplingReport;
+use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::settings::met;
 use crate::solver::{Columns, gmres};
@@ -83,7 +84,7 @@ impl Scattering {
                 format!("must be {}, one a body", self.bodies.len()),
             ));
         }
-        let places = Places::new(&self.bodies, &self.sizes, &self.cells, poses);
+        let places = Places::new(self, poses);
         let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
         Ok(Scattered {
             known: Distances::new(&pairs.near, &self.points, &places),
@@ -94,6 +95,13 @@ impl Scattering {
             motions,
             kept: Mutex::default(),
         })
+    }
+}
+
+impl<'a> Scattered<'a> {
+    /// The bodies where they don't feel each other.
+    pub fn alone(&self) -> &'a Isolated {
+        self.model.alone()
     }
 }
 
@@ -146,15 +154,16 @@ impl Scattered<'_> {
 
     /// The two bodies whose points are nearest to each other against their sizes, of those that are seen point by point.
     fn nearest(&self) -> Option<[usize; 2]> {
+        let model = self.model;
         let ratio = |near: &Near| {
             let [a, b] = near.bodies;
-            let centre = |b: usize| self.model.bodies[b].parts().centre;
-            let [x, y] = [a, b].map(|b| self.poses[b].apply(&centre(b)));
-            (self.model.sizes[a] + self.model.sizes[b]) / (x - y).norm()
+            let [x, y] = [a, b].map(|b| self.places.centres[model.cells.leaf[b]]);
+            (model.sizes[a] + model.sizes[b]) / length(&minus(&x, &y))
         };
         let pairs = self.pairs.near.iter();
         let nearest = pairs.max_by(|a, b| ratio(a).total_cmp(&ratio(b)));
-        nearest.map(|near| near.bodies)
+        // What a mirror shows of a body has its name.
+        nearest.map(|near| near.bodies.map(|b| b % self.poses.len()))
     }
 
     fn sums(&self) -> Sums<'_, f64> {
@@ -334,8 +343,7 @@ impl Scattered<'_> {
 
     /// The places as the bodies are displaced.
     pub(super) fn moving(&self, z: &[Vec6]) -> Places<Dual64> {
-        let model = self.model;
-        Places::moving(&model.bodies, &model.sizes, &model.cells, &self.poses, z)
+        Places::moving(self.model, &self.poses, z)
     }
 
     /// `DĜ[Z] α`.
@@ -347,12 +355,12 @@ impl Scattered<'_> {
     }
 
     /// The gradient of ½ αᵀ Ĝ α as bodies are displaced and the charges change.
-    pub(super) fn gradient_jvp(
-        &self,
-        places: &Places<Dual64>,
+    pub(super) fn gradient_jvp<'p>(
+        &'p self,
+        places: &'p Places<Dual64>,
         charges: &[f64],
         rates: &[f64],
-    ) -> Gradient<Dual64> {
+    ) -> Gradient<'p, Dual64> {
         Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates))
     }
 
@@ -390,7 +398,7 @@ impl Scattered<'_> {
 
     /// Adds each body's own impulses.
     pub(super) fn add_own(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
-        for (b, own) in self.model.own.iter().enumerate() {
+        for (b, own) in self.model.own().iter().enumerate() {
             let own: &Mat6 = own;
             let twist = twists.fixed_rows::<6>(6 * b).into_owned();
             let mut rows = out.fixed_rows_mut::<6>(6 * b);

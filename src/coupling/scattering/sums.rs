@@ -27,23 +27,27 @@ pub(super) struct Sums<'s, T> {
 }
 
 /// The energy's gradient: in the charges the potentials that they see, and in the bodies' places spatial wrenches.
-pub(super) struct Gradient<T> {
+pub(super) struct Gradient<'s, T> {
+    model: &'s Scattering,
     pub potentials: Vec<T>,
+    /// On all that is seen.
     wrenches: Vec<[T; 6]>,
 }
 
-impl Gradient<f64> {
+impl Gradient<'_, f64> {
     pub fn wrenches(&self) -> Vec<Vec6> {
-        self.wrenches.iter().map(|w| Vec6::from(*w)).collect()
+        let all = self.wrenches.iter().map(|w| Vec6::from(*w));
+        self.model.gathered_wrenches(all.collect())
     }
 }
 
-impl Gradient<Dual64> {
+impl Gradient<'_, Dual64> {
     /// The wrenches, and their rates.
     pub fn wrenches_and_rates(&self) -> [Vec<Vec6>; 2] {
         let of = |part: fn(&Dual64) -> f64| {
-            let each = self.wrenches.iter();
-            each.map(|w| Vec6::from_fn(|i, _| part(&w[i]))).collect()
+            let all = self.wrenches.iter();
+            let all = all.map(|w| Vec6::from_fn(|i, _| part(&w[i])));
+            self.model.gathered_wrenches(all.collect())
         };
         [of(|x| x.re), of(|x| x.eps)]
     }
@@ -100,7 +104,7 @@ impl<'s, T: Number> Sums<'s, T> {
 
     /// `each` of every body with room for its part of `out`, `n` numbers a body.
     fn of_bodies<X: Send>(&self, out: &mut [X], n: usize, each: impl Fn(usize, &mut [X]) + Sync) {
-        match self.model.bodies.len() < FEW {
+        match self.model.points.len() < FEW {
             true => out.chunks_mut(n).enumerate().for_each(|(b, x)| each(b, x)),
             false => (out.par_chunks_mut(n).enumerate()).for_each(|(b, x)| each(b, x)),
         }
@@ -111,7 +115,7 @@ impl<'s, T: Number> Sums<'s, T> {
         let (table, cells) = (&self.model.table, &self.model.cells);
         let n = table.moments();
         let zero = T::constant(0.0);
-        let mut of_bodies = vec![zero; n * self.model.bodies.len()];
+        let mut of_bodies = vec![zero; n * self.model.points.len()];
         self.of_bodies(&mut of_bodies, n, |b, out| {
             multipole::vectorized(
                 #[inline(always)]
@@ -134,12 +138,12 @@ impl<'s, T: Number> Sums<'s, T> {
         for (own, leaf) in of_bodies.chunks_exact(n).zip(&cells.leaf) {
             out[n * leaf..][..n].copy_from_slice(own);
         }
-        let mut powers = vec![zero; n];
+        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
         for i in (1..cells.cells.len()).rev() {
             self.shift(i, &mut powers);
             let (above, own) = out.split_at_mut(n * i);
-            let parent = n * cells.cells[i].parent;
-            multipole::shift(table, &powers, &own[..n], &mut above[parent..parent + n]);
+            let above = &mut above[n * cells.cells[i].parent..][..n];
+            multipole::shift(table, &powers, &own[..n], above, &mut room);
         }
         out
     }
@@ -169,11 +173,12 @@ impl<'s, T: Number> Sums<'s, T> {
             worth.extend(part.slopes);
         }
         let mut powers = vec![T::constant(0.0); n];
+        let mut room = vec![T::constant(0.0); table.derivatives()];
         for (i, cell) in cells.iter().enumerate().skip(1) {
             self.shift(i, &mut powers);
             let (above, own) = out.split_at_mut(n * i);
             let bar = &above[n * cell.parent..][..n];
-            multipole::shift_back(table, &powers, bar, &mut own[..n]);
+            multipole::shift_back(table, &powers, bar, &mut own[..n], &mut room);
         }
         (out, worth)
     }
@@ -222,7 +227,7 @@ impl<'s, T: Number> Sums<'s, T> {
                 },
             )
         };
-        let bodies = 0..self.model.bodies.len();
+        let bodies = 0..self.model.points.len();
         let all: Vec<Vec<[T; 4]>> = match bodies.len() < FEW {
             true => bodies.map(one).collect(),
             false => bodies.into_par_iter().map(one).collect(),
@@ -232,16 +237,18 @@ impl<'s, T: Number> Sums<'s, T> {
 
     /// G α: the potential at each point that the other bodies' charges make.
     pub fn potentials(&self, charges: &[T]) -> Vec<T> {
+        let charges = &*self.model.spread(charges);
         let (locals, _) = self.locals(&self.moments(charges), false);
         let mut out = self.near(charges, false).potentials;
         for (out, [seen, ..]) in out.iter_mut().zip(self.seen_afar(&locals, false)) {
             *out += seen;
         }
-        out
+        self.model.gathered(out)
     }
 
     /// The gradient of ½ αᵀ G α.
-    pub fn gradient(&self, charges: &[T]) -> Gradient<T> {
+    pub fn gradient(&self, charges: &[T]) -> Gradient<'s, T> {
+        let charges = &*self.model.spread(charges);
         let (table, cells) = (&self.model.table, &self.model.cells);
         let n = table.moments();
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
@@ -252,11 +259,11 @@ impl<'s, T: Number> Sums<'s, T> {
         let mut radii = vec![zero; cells.cells.len()];
         far::pull(&self.pairs.far, &worth, &self.weights, &mut centres);
         self.blends(&worth, &near.energies, &mut centres, &mut radii);
-        let mut powers = vec![zero; n];
+        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
         for (i, cell) in cells.cells.iter().enumerate().skip(1) {
             self.shift(i, &mut powers);
             let (own, bar) = (&moments[n * i..][..n], &locals[n * cell.parent..][..n]);
-            let slope = multipole::shift_gradient(table, &powers, own, bar);
+            let slope = multipole::shift_gradient(table, &powers, own, bar, &mut room);
             add(&mut centres[i], one, &slope);
             add(&mut centres[cell.parent], -one, &slope);
         }
@@ -290,8 +297,9 @@ impl<'s, T: Number> Sums<'s, T> {
             *out += *seen;
         }
         Gradient {
+            model: self.model,
             wrenches,
-            potentials: near.potentials,
+            potentials: self.model.gathered(near.potentials),
         }
     }
 

@@ -34,6 +34,8 @@ const LEFT: f64 = 0.3;
 /// A velocity with its imbalance M (v − v*) − Δt g.
 struct Trial {
     v: DVector<f64>,
+    /// M (v − v*).
+    moved: DVector<f64>,
     imbalance: DVector<f64>,
     residual: f64,
 }
@@ -48,23 +50,26 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     let sized = split.sizes(&e.mass_blocks().diagonal());
     let summands = e.mass_blocks().mapped(DMatrix::abs);
     let least = sized(&summands.times(&before.abs()));
-    let at = |v: DVector<f64>| {
-        let imbalance = e.mass_times(&(&v - before)) - dt * e.contact_force(&v, Dual::User);
+    let at = |v: DVector<f64>, moved: Option<DVector<f64>>| {
+        let moved = moved.unwrap_or_else(|| e.mass_times(&(&v - before)));
+        let imbalance = &moved - dt * e.contact_force(&v, Dual::User);
         let size = sized(&summands.times(&v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
         let residual = share(sized(&imbalance), size);
         Trial {
             v,
+            moved,
             imbalance,
             residual,
         }
     };
-    let mut now = at(before.clone());
+    let mut now = at(before.clone(), None);
     let (mut previous, mut places) = (f64::INFINITY, Places::default());
     for iteration in 0..ITERATIONS {
         let stalled = now.residual >= 0.25 * previous;
         let converged = now.residual == 0.0 || (now.residual <= RESIDUAL && stalled);
         if converged || (iteration + 1 == ITERATIONS && now.residual <= ENOUGH) {
+            e.check()?;
             return Ok(now.v);
         }
         if !now.residual.is_finite() {
@@ -72,9 +77,12 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
         }
         previous = now.residual;
         let hessian = Hessian::new(e, split, &now.v, dt, &mut places)?;
-        let step = hessian.solve(&split.take(&now.imbalance));
+        let step = hessian.step(&split.take(&now.imbalance));
         let step = split.put(&step);
-        now = search(now, &step, &at);
+        // Where a product with M is a solve it follows from that of the step, (M − Δt ∂g/∂v) s being the imbalance.
+        let moved =
+            (e.scattered()).map(|_| &now.imbalance + dt * e.contact_force_jvp(&now.v, &step));
+        now = search(now, &step, moved.as_ref(), &at);
     }
     Err(Error::Solver {
         what: start.stage_name(),
@@ -86,12 +94,21 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     })
 }
 
-/// Along Newton's step: the full one, or where that runs past the least value on its way, about there (regula falsi on the
+/// Along Newton's step, whose product with M is `moved` where it is known: the full one, or where that runs past the least value on its way, about there (regula falsi on the
 /// slope, in halves where it creeps). Short of it won't do: where the slope turns steeply, regula falsi's first guess is hardly a step.
-fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -> Trial {
+fn search(
+    now: Trial,
+    step: &DVector<f64>,
+    moved: Option<&DVector<f64>>,
+    at: &dyn Fn(DVector<f64>, Option<DVector<f64>>) -> Trial,
+) -> Trial {
+    let after = |length: f64| {
+        let moved = moved.map(|moved| &now.moved - length * moved);
+        at(&now.v - length * step, moved)
+    };
     let slope = |t: &Trial| t.imbalance.dot(step);
     let start = slope(&now);
-    let mut best = at(&now.v - step);
+    let mut best = after(1.0);
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
     if high.1 >= -LEFT * start || start.is_nan() || start <= 0.0 {
         return best;
@@ -101,7 +118,7 @@ fn search(now: Trial, step: &DVector<f64>, at: &dyn Fn(DVector<f64>) -> Trial) -
             0 => (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1),
             _ => 0.5 * (low.0 + high.0),
         };
-        let next = at(&now.v - length * step);
+        let next = after(length);
         let there = slope(&next);
         match there < 0.0 {
             true => high = (length, there),
@@ -142,23 +159,23 @@ pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVecto
 }
 
 /// What the derivatives of [`solve`] and [`apply`] need.
-pub(super) struct Adjoint<'s> {
+pub(super) struct Adjoint<'s, 'a> {
     pub velocities: &'s ContactVelocities,
-    acting: Acting,
+    acting: Acting<'a>,
 }
 
-enum Acting {
+enum Acting<'a> {
     /// Nothing presses.
     No,
     /// Something does, but every velocity is driven.
     Driven,
     /// The problem's Hessian at its solution, factored.
-    Solved(Hessian),
+    Solved(Hessian<'a>),
 }
 
-impl<'s> Adjoint<'s> {
+impl<'s, 'a> Adjoint<'s, 'a> {
     /// At a step's velocities before and after contact.
-    pub fn new(start: &Start, velocities: &'s ContactVelocities) -> Result<Self> {
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (e, split) = (start.near, start.split);
         let acting = if !e.contact_acts(&velocities.before) {
             Acting::No

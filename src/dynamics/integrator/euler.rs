@@ -13,17 +13,18 @@
 
 use super::contact;
 use super::energy::{self, Closure};
-use super::plan::{Halt, MOST};
+use super::plan::Halt;
 use super::quasi::{self, Trial};
-use super::split::{Split, share};
+use super::rule::Rule;
+use super::split::share;
+use super::stage_adjoint::AdjointStage;
+use super::stage_factor::{StageFactor, StageMatrix};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
-use crate::adjoint::solve::Definite;
-use crate::dynamics::island_matrix::{IslandFactor, IslandMatrix};
-use crate::dynamics::slopes::columns;
-use crate::dynamics::{Drift, Linearisation};
+use crate::dynamics::Linearisation;
+use crate::dynamics::island_matrix::IslandMatrix;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -33,8 +34,6 @@ const ITERATIONS: usize = 40;
 const ENOUGH: f64 = 1e-11;
 /// Shortest part of Newton's step.
 const SHORTEST: f64 = 1.0 / 4096.0;
-/// Largest part by which the inertia may change in the time of a stage.
-const CHANGE: f64 = 0.25;
 
 /// A converged stage.
 pub(super) struct ImplicitStage {
@@ -49,109 +48,6 @@ impl From<Trial> for ImplicitStage {
         let Trial { v, force, .. } = trial;
         Self { v, force }
     }
-}
-
-/// An implicit stage: `M v + p_rest = J(ξ)ᵀ X(q ⊕ ξ)ᵀ (p̂ + h f(q, v, u))` with ξ = reach v; h (1 − h D) for h where the stage has a configuration of its own,
-/// before which bodies have drifted for the time h ([`crate::dynamics::Drift`]).
-#[derive(Clone, Copy)]
-pub(super) struct Rule {
-    /// Time over which the force acts, s.
-    pub h: f64,
-    /// Time over which the chart reaches out, s: the step's for Euler; zero where q is the stage's own.
-    pub reach: f64,
-}
-
-impl Rule {
-    /// What a force adds to the momentum.
-    pub fn impulse(&self, e: &Linearisation, force: &DVector<f64>) -> DVector<f64> {
-        self.drifted(e, force, |drift, x| drift.carry(-self.h, x))
-    }
-
-    /// Transpose of [`Rule::impulse`].
-    pub fn impulse_back(&self, e: &Linearisation, bar: &DVector<f64>) -> DVector<f64> {
-        self.drifted(e, bar, |drift, x| drift.carry_back(-self.h, x))
-    }
-
-    fn drifted(
-        &self,
-        e: &Linearisation,
-        x: &DVector<f64>,
-        carry: impl Fn(&Drift, DVector<f64>) -> DVector<f64>,
-    ) -> DVector<f64> {
-        let x = self.h * x;
-        match self.reach == 0.0 {
-            true => carry(&e.system.drift, x),
-            false => x,
-        }
-    }
-}
-
-/// Matrix of the stage, from ∂f/∂v and the momentum p̂ + h f.
-fn stage_matrix(
-    e: &Linearisation,
-    v: &DVector<f64>,
-    rates: &IslandMatrix,
-    reached: &DVector<f64>,
-    rule: Rule,
-) -> IslandMatrix {
-    let tree = &e.system.tree;
-    let xi = rule.reach * v;
-    let [_, by_xi, by_hat] = tree.chart_momentum_slopes(&e.q, &xi, reached);
-    let impulses = rates.mapped(|rates| columns(rates, |rate| rule.impulse(e, rate)));
-    let mut m = (e.mass_blocks()).minus(&impulses.mapped(|impulses| by_hat.times(impulses)));
-    if rule.reach != 0.0 {
-        m.subtract(by_xi.entries().map(|(i, j, x)| (i, j, rule.reach * x)));
-    }
-    m
-}
-
-/// How many times too long a step is for its implicit stage; none where it isn't.
-///
-/// With W = h ∂f/∂v on the free rows, the stage's matrix is M − W but for what turning adds, and κ the largest eigenvalue of
-/// M^-½ ½(W + Wᵀ) M^-½: the part by which the inertia M changes in the time h of what moves relative to the water, less what damps. In one coordinate it is
-/// h v M′/M, and there is no solution from κ = ½ on. Up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations of each island.
-fn excess(
-    e: &Linearisation,
-    split: &Split,
-    v: &DVector<f64>,
-    rates: &IslandMatrix,
-    rule: Rule,
-) -> Option<usize> {
-    if rates.is_zero() {
-        return None;
-    }
-    let xi = rule.reach * v;
-    let (tree, drift) = (&e.system.tree, &e.system.drift);
-    let [_, _, by_hat] = tree.chart_momentum_slopes(&e.q, &xi, &DVector::zeros(v.len()));
-    let mut grown = rates.mapped(|rates| columns(rates, |rate| rule.impulse(e, rate)));
-    let inertia = e.mass_blocks();
-    if !drift.is_none() {
-        let turned = |m: &DVector<f64>| rule.h * drift.turn(&e.frame_dual(m));
-        grown = grown.minus(&inertia.mapped(|m| columns(m, turned)));
-    }
-    let grown = grown.mapped(|grown| by_hat.times(grown));
-    let blocks = grown.free_blocks(&split.free);
-    let blocks = blocks.zip(inertia.free_blocks(&split.free));
-    let each = blocks.filter_map(|((_, grown), (_, m))| own_excess(grown, m));
-    each.max()
-}
-
-/// The same of the velocities of an island.
-fn own_excess(grown: DMatrix<f64>, m: DMatrix<f64>) -> Option<usize> {
-    let grown = 0.5 * (&grown + grown.transpose());
-    if grown.is_empty() || Definite::new(CHANGE * &m - &grown).is_some() {
-        return None;
-    }
-    let lower = m.cholesky()?.unpack();
-    let half = lower.solve_lower_triangular(&grown)?;
-    let scaled = lower.solve_lower_triangular(&half.transpose())?;
-    let change = match scaled.iter().all(|x| x.is_finite()) {
-        true => (0.5 * (&scaled + scaled.transpose()))
-            .symmetric_eigenvalues()
-            .max(),
-        false => f64::INFINITY,
-    };
-    Some((change / CHANGE).ceil().clamp(2.0, MOST as f64) as usize)
 }
 
 /// The equation of a stage at `e`, from the momentum at the step's start.
@@ -214,11 +110,15 @@ impl<'s, 'a> Equation<'s, 'a> {
         })
     }
 
-    /// The factor of its matrix at a trial.
-    fn factor(&self, now: &Trial, rates: &IslandMatrix) -> IslandFactor {
-        let Trial { v, reached, .. } = now;
-        let matrix = stage_matrix(self.e, v, rates, reached, self.rule);
-        matrix.factored(&self.start.split.free, false)
+    /// The factor of its matrix at a trial; none of a singular one.
+    fn factor(&self, now: &Trial) -> Result<Option<StageFactor<'a>>> {
+        let made = StageMatrix::new(self.e, &now.v, &self.start.input.control)?;
+        Ok(self.factored(&made, now))
+    }
+
+    fn factored(&self, made: &StageMatrix<'_, 'a>, now: &Trial) -> Option<StageFactor<'a>> {
+        let matrix = made.matrix(&now.v, &now.reached, self.rule);
+        made.factored(self.start.split, &matrix, false)
     }
 
     /// What momenta are weighed by in turn: the inertia of the free velocities, each by itself.
@@ -226,17 +126,30 @@ impl<'s, 'a> Equation<'s, 'a> {
         self.start.split.take(&self.e.mass_blocks().diagonal())
     }
 
-    /// The same at the first trial of a step, if the step isn't too long.
-    pub fn first_factor(&self, now: &Trial) -> std::result::Result<IslandFactor, Halt> {
-        let (e, start) = (self.e, &self.start);
-        let rates = e.force_velocity_blocks(&now.v, &start.input.control)?;
+    /// What of a residual says nothing: what the water's solves leave open, where momenta are products of them.
+    pub fn noise(&self) -> f64 {
+        match self.e.scattered() {
+            Some(_) => noise(self.e),
+            None => 0.0,
+        }
+    }
+
+    /// The factor at the first trial of a step, if the step isn't too long.
+    pub fn first_factor(&self, now: &Trial) -> std::result::Result<Option<StageFactor<'a>>, Halt> {
+        let start = &self.start;
+        let made = StageMatrix::new(self.e, &now.v, &start.input.control)?;
         if start.plan.may_cut()
-            && let Some(times) = excess(e, start.split, &now.v, &rates, self.rule)
+            && let Some(times) = made.excess(start.split, &now.v, self.rule)
         {
             return Err(Halt::TooLong(times));
         }
-        Ok(self.factor(now, &rates))
+        Ok(self.factored(&made, now))
     }
+}
+
+/// Relative change of the velocity, or of momenta, that says nothing: rounding, or what the coupled solve leaves open.
+pub(super) fn noise(e: &Linearisation) -> f64 {
+    (10.0 * e.report().residual).max(1e-11)
 }
 
 /// Solves a stage of a step at `e` on the free rows, from the momentum at the step's start and a guess of its velocity: by [`quasi`], and where that doesn't get there by
@@ -248,8 +161,7 @@ pub(super) fn solve_stage<'a>(
     rule: Rule,
     guess: &DVector<f64>,
 ) -> std::result::Result<ImplicitStage, Halt> {
-    let (split, control) = (start.split, &start.input.control);
-    let tree = &e.system.tree;
+    let (split, tree) = (start.split, &e.system.tree);
     let equation = Equation::new(start, e, hat, rule);
     let mut now = equation.at(split.complete(guess))?;
     let mut previous = f64::INFINITY;
@@ -257,7 +169,8 @@ pub(super) fn solve_stage<'a>(
         let residual = now.residual;
         // Stop where rounding ends the quadratic convergence.
         let at_last = iteration + 1 == ITERATIONS && residual <= ENOUGH;
-        if now.converged(previous) || at_last {
+        let noisy = residual <= equation.noise() && residual > 0.5 * previous;
+        if now.converged(previous) || noisy || at_last {
             return Ok(now.into());
         }
         if !residual.is_finite() || iteration + 1 == ITERATIONS {
@@ -266,15 +179,18 @@ pub(super) fn solve_stage<'a>(
         previous = residual;
         let factor = if iteration == 0 {
             let factor = equation.first_factor(&now)?;
-            let at = |v| equation.at(v);
-            if let Some(found) = quasi::descend(split, &equation.weight(), &factor, &now, 0.0, at) {
+            let (weight, noise, at) = (equation.weight(), equation.noise(), |v| equation.at(v));
+            let found = (factor.as_ref())
+                .and_then(|factor| quasi::descend(split, &weight, factor, &now, noise, at));
+            if let Some(found) = found {
                 return Ok(found.into());
             }
             factor
         } else {
-            equation.factor(&now, &e.force_velocity_blocks(&now.v, control)?)
+            equation.factor(&now)?
         };
-        let Some(step) = factor.solve(&split.take(&now.defect)) else {
+        let step = factor.and_then(|factor| factor.solve(&split.take(&now.defect)));
+        let Some(step) = step else {
             break;
         };
         let step = split.put(&step);
@@ -334,17 +250,18 @@ pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages),
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: contact::Adjoint<'s>,
+    contact: contact::Adjoint<'s, 'a>,
     /// p̂ + Δt f.
     reached: DVector<f64>,
-    stage: AdjointStage,
+    stage: AdjointStage<'a>,
     closure: Option<Closure<'a>>,
 }
 
 impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (s, e) = (start.stepper, start.e);
-        let force = e.force(&velocities.before, &start.input.control)?;
+        let control = &start.input.control;
+        let force = e.force(&velocities.before, control)?;
         let reached = start.momentum() + s.dt * force;
         let closure = match s.integrator {
             Integrator::EnergyEuler => {
@@ -355,7 +272,14 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         };
         Ok(Self {
             closure,
-            stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
+            stage: AdjointStage::new(
+                start.split,
+                e,
+                &velocities.before,
+                control,
+                &reached,
+                rule(s),
+            )?,
             contact: contact::Adjoint::new(start, velocities)?,
             reached,
         })
@@ -379,7 +303,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         // p̂ + Δt f at a given velocity; the stage's matrix holds what the velocity does.
         let held = start.momentum_jvp(along)? + s.dt * force.along(q, None, inputs);
         let right = by_q.dense() * q + by_hat.dense() * &held - momentum.along(q, None, inputs);
-        let v = self.stage.solve_jvp(split, &right)?;
+        let v = self.stage.solve_jvp(e, split, &right)?;
         let hat = held + s.dt * (force.v * &v);
         let (mut next, after) = self.contact.apply_jvp(start, along, &v, hat)?;
         if let Some(closure) = &self.closure {
@@ -405,8 +329,8 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
             }
         };
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
-        v_bar += s.dt * self.stage.rates.tr_times(&z);
-        let w = self.stage.solve(split, &v_bar)?;
+        v_bar += s.dt * self.stage.rates_vjp(e, &z)?;
+        let w = self.stage.solve(e, split, &v_bar)?;
         let tree = &e.system.tree;
         let [q_bar, _, hat_bar] =
             tree.chart_momentum_vjp(&e.q, &(s.dt * before), &self.reached, &w);
@@ -416,73 +340,5 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         bar.add(-1.0, &e.momentum_vjp(before, &w)?);
         start.momentum_vjp(&z_total, &mut bar)?;
         Ok(bar)
-    }
-}
-
-/// What the derivatives of a stage need.
-pub(super) struct AdjointStage {
-    /// ∂f/∂v.
-    pub rates: IslandMatrix,
-    /// The stage matrix.
-    pub matrix: IslandMatrix,
-    /// Factor of the transposed stage matrix.
-    factor: IslandFactor,
-}
-
-impl AdjointStage {
-    /// Of a step's stage at `e`, with velocity v and momentum p̂ + h f.
-    pub fn new(
-        start: &Start,
-        e: &Linearisation,
-        v: &DVector<f64>,
-        reached: &DVector<f64>,
-        rule: Rule,
-    ) -> Result<Self> {
-        let rates = e.force_velocity_blocks(v, &start.input.control)?;
-        let matrix = stage_matrix(e, v, &rates, reached, rule);
-        let factor = matrix.factored(&start.split.free, true);
-        Ok(Self {
-            rates,
-            matrix,
-            factor,
-        })
-    }
-
-    /// dv, zero on driven entries, with stage matrix · dv_f = right_f: the factor is of all columns.
-    fn solve_jvp(&self, split: &Split, right: &DMatrix<f64>) -> Result<DMatrix<f64>> {
-        solve_columns(&self.matrix, split, right)
-    }
-
-    /// w_f with (stage matrix)ᵀ w_f = v̄_f, zero on driven entries.
-    pub fn solve(&self, split: &Split, v_bar: &DVector<f64>) -> Result<DVector<f64>> {
-        if split.free.is_empty() {
-            return Ok(DVector::zeros(v_bar.len()));
-        }
-        let solution = self.factor.solve(&split.take(v_bar));
-        Ok(split.put(&solution.ok_or_else(|| singular("adjoint"))?))
-    }
-}
-
-/// Columns dv, zero on driven rows, with `matrix` · dv_f = right_f.
-pub(super) fn solve_columns(
-    matrix: &IslandMatrix,
-    split: &Split,
-    right: &DMatrix<f64>,
-) -> Result<DMatrix<f64>> {
-    if split.free.is_empty() {
-        return Ok(DMatrix::zeros(right.nrows(), right.ncols()));
-    }
-    let factor = matrix.factored(&split.free, false);
-    let solution = factor.solve_columns(&split.take_rows(right));
-    Ok(split.put_rows(&solution.ok_or_else(|| singular("tangent"))?))
-}
-
-fn singular(what: &str) -> Error {
-    Error::Solver {
-        what: format!("{what} of an implicit stage"),
-        iterations: 0,
-        residual: f64::INFINITY,
-        tolerance: 0.0,
-        remedy: "the stage matrix is singular: take a smaller time step".into(),
     }
 }

@@ -1,9 +1,11 @@
 //! The Hessian M + Δt Jᵀ G J of the problem of contact on the free velocities, factored: as one matrix of a few velocities and of bodies that feel each other through
-//! the water, else as a sparse one, in an order of elimination in which bodies that touch many others come last.
+//! the water, else as a sparse one, in an order of elimination in which bodies that touch many others come last. Many bodies that are coupled by products press in what is
+//! theirs alone, and all of that recoils in what they exchange.
 
 use super::split::Split;
 use crate::adjoint::solve::Definite;
 use crate::dynamics::Evaluation;
+use crate::dynamics::recoil::Recoiling;
 use crate::solver::{SparseCholesky, SparsePattern, elimination_order};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -11,7 +13,14 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Such a factor.
-pub(super) enum Hessian {
+pub(super) enum Hessian<'a> {
+    Alone(Factor),
+    /// With the velocities that are free.
+    Recoiling(Recoiling<'a>, Split),
+}
+
+/// That of bodies whose mass matrix is formed.
+pub(super) enum Factor {
     Dense(Definite),
     Sparse(SparseCholesky<1>),
 }
@@ -23,34 +32,71 @@ pub(super) struct Places {
     pattern: Option<Arc<SparsePattern>>,
 }
 
-impl Hessian {
+impl<'a> Hessian<'a> {
     /// At the velocity `v` and the time step `dt` (s).
     ///
     /// # Errors
     /// A Hessian that isn't positive definite.
     pub fn new(
-        e: &Evaluation,
+        e: &Evaluation<'a>,
         split: &Split,
         v: &DVector<f64>,
         dt: f64,
         places: &mut Places,
     ) -> Result<Self> {
         let found = match e.mass_blocks().is_whole() {
-            true => dense(e, split, v, dt).map(Self::Dense),
-            false => sparse(e, split, v, dt, places).map(Self::Sparse),
+            true => dense(e, split, v, dt).map(Factor::Dense),
+            false => sparse(e, split, v, dt, places).map(Factor::Sparse),
         };
-        found.ok_or_else(|| Error::Solver {
+        let factor = found.ok_or_else(|| Error::Solver {
             what: "contact".into(),
             iterations: 0,
             residual: f64::INFINITY,
             tolerance: 0.0,
             remedy: "the mass matrix isn't positive definite, or the stiffness is out of range"
                 .into(),
-        })
+        })?;
+        let Some(at) = e.scattered() else {
+            return Ok(Self::Alone(factor));
+        };
+        let free = split.clone();
+        let own = move |right: &DVector<f64>| free.put(&factor.solve(&free.take(right)));
+        let many = Recoiling::new(e, at, Box::new(own));
+        Ok(Self::Recoiling(many, split.clone()))
     }
 
     /// `x = H⁻¹ b`, of the free velocities; H is symmetric, so that it is its own transpose's, too.
     pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Alone(factor) => factor.solve(b),
+            Self::Recoiling(many, split) => split.take(&many.solve(&split.put(b))),
+        }
+    }
+
+    /// The same for a step of the search, of which the water is asked no more.
+    pub fn step(&self, b: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Alone(factor) => factor.solve(b),
+            Self::Recoiling(many, split) => split.take(&many.change(&split.put(b))),
+        }
+    }
+
+    /// [`Hessian::solve`] of every column.
+    pub fn solve_columns(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        if let Self::Alone(Factor::Dense(factor)) = self {
+            return factor.solve_columns(b);
+        }
+        let mut out = b.clone();
+        for mut column in out.column_iter_mut() {
+            let found = self.solve(&column.clone_owned());
+            column.copy_from(&found);
+        }
+        out
+    }
+}
+
+impl Factor {
+    fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
         match self {
             Self::Dense(factor) => factor.solve(b),
             Self::Sparse(factor) => {
@@ -60,25 +106,10 @@ impl Hessian {
             }
         }
     }
-
-    /// The same of every column.
-    pub fn solve_columns(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
-        match self {
-            Self::Dense(factor) => factor.solve_columns(b),
-            Self::Sparse(_) => {
-                let mut out = b.clone();
-                for mut column in out.column_iter_mut() {
-                    let found = self.solve(&column.clone_owned());
-                    column.copy_from(&found);
-                }
-                out
-            }
-        }
-    }
 }
 
 fn dense(e: &Evaluation, split: &Split, v: &DVector<f64>, dt: f64) -> Option<Definite> {
-    let m = e.mass_matrix() - dt * e.contact_jacobian(v);
+    let m = e.mass_blocks().dense() - dt * e.contact_jacobian(v);
     let m: DMatrix<f64> = 0.5 * (&m + m.transpose());
     Definite::new(split.block(&m))
 }

@@ -14,10 +14,12 @@
 //! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
 use super::contact;
-use super::euler::{AdjointStage, Equation, Rule, solve_columns, solve_stage};
+use super::euler::{Equation, noise, solve_stage};
 use super::plan::Halt;
 use super::quasi;
+use super::rule::Rule;
 use super::split::share;
+use super::stage_adjoint::{AdjointStage, solve_columns};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
@@ -46,11 +48,6 @@ fn middle<'a>(start: &Start<'_, 'a>, v: &DVector<f64>) -> Result<Linearisation<'
     let t = s.time(state) + 0.5 * s.dt;
     s.place_motions(&mut q, t);
     s.system.linearise_apart(s.parameters, &q, t)
-}
-
-/// Relative change of the velocity that says nothing: rounding, or what the coupled solve leaves open.
-fn noise(e: &Linearisation) -> f64 {
-    (10.0 * e.report().residual).max(1e-11)
 }
 
 /// Relative change between two velocities, each joint coordinate weighed by its inertia.
@@ -108,7 +105,9 @@ fn at_once(
     if first.converged(f64::INFINITY) {
         return Ok(Some(first));
     }
-    let factor = equation.first_factor(&first)?;
+    let Some(factor) = equation.first_factor(&first)? else {
+        return Ok(None);
+    };
     let at = |v: DVector<f64>| {
         let m = middle(start, &v)?;
         Equation::new(start, &m, p, rule).at(v)
@@ -120,23 +119,24 @@ fn at_once(
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: contact::Adjoint<'s>,
+    contact: contact::Adjoint<'s, 'a>,
     /// The system in the middle of the step.
     middle: Linearisation<'a>,
     /// p̂ + ½Δt f.
     reached: DVector<f64>,
-    stage: AdjointStage,
+    stage: AdjointStage<'a>,
 }
 
 impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (s, before) = (start.stepper, &velocities.before);
         let middle = middle(start, before)?;
-        let force = middle.force(before, &start.input.control)?;
+        let control = &start.input.control;
+        let force = middle.force(before, control)?;
         let reached = start.momentum() + rule(s).impulse(&middle, &force);
         Ok(Self {
             contact: contact::Adjoint::new(start, velocities)?,
-            stage: AdjointStage::new(start, &middle, before, &reached, rule(s))?,
+            stage: AdjointStage::new(start.split, &middle, before, control, &reached, rule(s))?,
             middle,
             reached,
         })
@@ -170,7 +170,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         // Derivative of Xᵀ(p̂ + h f) − M v − p_rest over q_m, which moves with v as well.
         let bent =
             frame.tr_mul(&impulse(&force.q)) + m.frame_momentum_slope(&self.reached) - &momentum.q;
-        let matrix = IslandMatrix::whole(self.stage.matrix.dense() - bent * &by_v);
+        let matrix = IslandMatrix::whole(self.stage.matrix(m)? - bent * &by_v);
         let p = start.momentum_jvp(along)?;
         let held = &p + impulse(&force.along(&middle, None, inputs));
         let right = frame.tr_mul(&held) + m.frame_momentum_slope(&self.reached) * &middle
@@ -187,13 +187,13 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let h = 0.5 * s.dt;
         let mut bar = StepBar::zeros(start.e);
         let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, None, &mut bar)?;
-        let v_bar_force = s.dt * self.stage.rates.tr_times(&z);
+        let v_bar_force = s.dt * self.stage.rates_vjp(m, &z)?;
         let fixed = v_bar_next + v_bar_force;
         // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
         let mut v_bar = fixed.clone();
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let w = self.stage.solve(split, &v_bar)?;
+            let w = self.stage.solve(m, split, &v_bar)?;
             let z_total = s.dt * &z + rule(s).impulse_back(m, &m.frame_velocity(&w));
             // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
             let mut inner = StepBar::zeros(m);

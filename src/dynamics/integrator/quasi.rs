@@ -5,7 +5,7 @@
 //! C. T. Kelley, "Solving Nonlinear Equations with Newton's Method", 2003, chapter 4.
 
 use super::split::Split;
-use crate::dynamics::island_matrix::IslandFactor;
+use super::stage_factor::StageFactor;
 use nalgebra::DVector;
 
 /// Most steps.
@@ -42,7 +42,7 @@ impl Trial {
 pub(super) fn descend(
     split: &Split,
     weight: &DVector<f64>,
-    factor: &IslandFactor,
+    factor: &StageFactor,
     first: &Trial,
     noise: f64,
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,

@@ -38,7 +38,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: contact::Adjoint<'s>,
+    contact: contact::Adjoint<'s, 'a>,
     acceleration: DVector<f64>,
     /// Of the mass matrix of free velocities.
     factor: Inertia<'a>,

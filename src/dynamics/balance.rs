@@ -17,7 +17,6 @@
 use super::fluid::{self, FluidMomenta};
 use super::force::{LoadBars, Loads, Moving, Place, Velocity};
 use super::island_matrix::IslandMatrix;
-use super::islands::Islands;
 use super::linearisation::Water;
 use super::slopes::unit;
 use super::{Evaluation, ForceCotangents, Linearisation, Parameters, Slopes};
@@ -366,10 +365,7 @@ impl Linearisation<'_> {
         v: &DVector<f64>,
         control: &DVector<f64>,
     ) -> Result<IslandMatrix> {
-        let islands = match self.scattered() {
-            Some(_) => Islands::whole(self.system.tree.velocities()),
-            None => self.islands(),
-        };
+        let islands = self.islands_of_all();
         let changes = islands.changes();
         let changed = match (self.acting(), &self.fluid) {
             (Some(water), FluidMomenta::Coupled(_) | FluidMomenta::Scattered(_)) => {

@@ -1,7 +1,6 @@
 //! The mass matrix M(q) = M_r + ρ Jᵀ M̄_f J: its products, itself, and its factor.
 
 use super::fluid::{self, FluidMomenta};
-use super::islands::Islands;
 use super::recoil::Recoiling;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
@@ -51,10 +50,7 @@ impl<'a> Evaluation<'a> {
             let made = match self.fluid {
                 FluidMomenta::Coupled(_) => self.rigid_and_coupled(),
                 FluidMomenta::Apart(_) | FluidMomenta::Still | FluidMomenta::Scattered(_) => {
-                    let islands = match self.scattered() {
-                        Some(_) => Islands::whole(self.system.tree.velocities()),
-                        None => self.islands(),
-                    };
+                    let islands = self.islands_of_all();
                     let changes = islands.changes();
                     let products: Vec<_> = changes.iter().map(|v| self.mass_times(v)).collect();
                     islands.matrix(&products)

@@ -15,6 +15,14 @@ impl Evaluation<'_> {
         }
     }
 
+    /// The same, what many bodies exchange by products asked as well.
+    pub(super) fn islands_of_all(&self) -> Islands {
+        match self.scattered() {
+            Some(_) => Islands::whole(self.system.tree.velocities()),
+            None => self.islands(),
+        }
+    }
+
     /// The same of the dampers that are solved with contact alone.
     pub(super) fn damped_islands(&self) -> Islands {
         self.tied(self.system.dampers().map(|f| f.ties()).collect())

@@ -8,14 +8,11 @@ use std::borrow::Cow;
 impl Scattering {
     /// c = [α, ½ σ α].
     pub(super) fn spread<'c, T: Number>(&self, charges: &'c [T]) -> Cow<'c, [T]> {
-        let [_, mirrored @ ..] = self.images.as_slice() else {
-            return Cow::Borrowed(charges);
-        };
-        if mirrored.is_empty() {
+        if self.images.len() == 1 {
             return Cow::Borrowed(charges);
         }
         let mut out = charges.to_vec();
-        for image in mirrored {
+        for image in &self.images[1..] {
             let part = T::constant(0.5 * image.sign);
             out.extend(charges.iter().map(|c| *c * part));
         }

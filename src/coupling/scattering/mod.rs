@@ -87,7 +87,7 @@ impl Scattering {
     /// The same with the images that walls make, which begin with none ([`Image::of_walls`]).
     ///
     /// # Errors
-    /// As [`Scattering::new`].
+    /// As [`Scattering::new`], and images that don't begin so.
     pub fn between(
         bodies: Vec<Arc<ReducedBody>>,
         names: Vec<String>,
@@ -100,6 +100,13 @@ impl Scattering {
                 "many bodies: names and poses",
                 format!("{} and {}", names.len(), start.len()),
                 format!("must be {} each, one a body", bodies.len()),
+            ));
+        }
+        if !images.first().is_some_and(Image::is_identity) {
+            return Err(Error::input(
+                "many bodies: images",
+                format!("{} of them", images.len()),
+                "must begin with none, the identity, as those of walls do",
             ));
         }
         let centre = |(body, pose): (&Arc<ReducedBody>, &Pose)| pose.apply(&body.parts().centre);

@@ -88,7 +88,7 @@ class Grip:
         """Cost, and its derivatives by the knots and the logarithms."""
         rollout, thickness = self.run(knots, logs, shaped=shaped), size_of(logs)[1]
         late, moved = seen(rollout, thickness)
-        cost = (WEIGHTS * late**2).sum() + COIN_WEIGHT * moved[-1] ** 2
+        cost = cost_of(late, moved)
         by_opening = 2.0 * WEIGHTS * late / (2.0 * (OPEN - SHUT))
         seed = np.zeros_like(rollout.positions)
         seed[:, 1, 1], seed[:, 0, 1] = by_opening, -by_opening
@@ -106,6 +106,10 @@ class Grip:
         by_size[1] += (start[1] - start[0]) / 2 - by_opening.sum()
         along = by_size * size_of(logs)
         return cost, by_knots, np.array([along[0] - along[1], along[2] - along[1]])
+
+
+def cost_of(late, moved):
+    return (WEIGHTS * late**2).sum() + COIN_WEIGHT * moved[-1] ** 2
 
 
 def seen(rollout, thickness):
@@ -155,8 +159,15 @@ def check(grip):
     knots, logs = first_knots(), np.array([-0.1, 0.05])
     cost, by_knots, by_logs = grip.gradient(knots, logs)
 
+    def cost_at(knots, logs, shaped):
+        return cost_of(*seen(grip.run(knots, logs, shaped=shaped), size_of(logs)[1]))
+
     def slope(knot, log, h):
-        ends = [grip.gradient(knots + s * h * np.eye(KNOTS)[knot] * (log is None), logs + (0 if log is None else s * h * np.eye(2)[log]))[0] for s in (1, -1)]
+        if log is None:
+            # The simulator that is there, with the shapes' derivatives.
+            ends = [cost_at(knots + s * h * np.eye(KNOTS)[knot], logs, True) for s in (1, -1)]
+        else:
+            ends = [cost_at(knots, logs + s * h * np.eye(2)[log], False) for s in (1, -1)]
         return (ends[0] - ends[1]) / (2 * h)
 
     forces = abs(slope(2, None, 1e-4) - by_knots[2]) / abs(by_knots).max()

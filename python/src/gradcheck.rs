@@ -21,6 +21,7 @@ pub fn check<'py>(
         directions,
         seed,
         timings: 0,
+        enough: None,
     };
     let made = long(py, move |_| {
         let growth = growth(&inner, steps)?;

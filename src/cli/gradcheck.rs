@@ -105,6 +105,7 @@ fn check(
             directions: arguments.directions,
             seed: arguments.seed,
             timings: 0,
+            enough: None,
         },
         done,
     )?;

@@ -275,6 +275,7 @@ fn gradients_are_the_differences() {
                 directions: 2,
                 seed: 3,
                 timings: 0,
+                enough: Some(1e-7),
             };
             let report = gradcheck(&mut sim, &settings).unwrap();
             println!("{fidelity:?} {integrator:?}: {:.1e}", report.max_rel_error);

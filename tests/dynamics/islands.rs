@@ -170,6 +170,7 @@ fn gradients_of_the_forest_hold_against_differences() {
             directions: 1,
             seed: 11,
             timings: 0,
+            enough: Some(1e-7),
         };
         let error = gradcheck(&mut simulator, &settings).unwrap().max_rel_error;
         assert!(error < 1e-7, "{integrator:?}: {error:.1e}");

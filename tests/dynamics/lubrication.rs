@@ -209,6 +209,7 @@ fn gradients_through_a_closing_gap() {
         directions: 1,
         seed: 1,
         timings: 0,
+        enough: Some(1e-6),
     };
     let report = gradcheck(&mut sim, &settings).unwrap();
     assert!(report.max_rel_error < 1e-6, "{report:?}");

@@ -174,6 +174,7 @@ fn transmissions_have_gradients_and_keep_energy() {
             directions: 2,
             seed: 3,
             timings: 0,
+            enough: Some(1e-6),
         };
         let report = gradcheck(&mut sim, &settings).unwrap();
         assert!(report.max_rel_error < 1e-6, "{integrator:?}: {report:?}");
@@ -228,6 +229,7 @@ fn stiff_servos_hold_their_target() {
             directions: 2,
             seed: 1,
             timings: 0,
+            enough: Some(1e-6),
         };
         let report = gradcheck(&mut sim, &settings).unwrap();
         assert!(report.max_rel_error < 1e-6, "{integrator:?}: {report:?}");

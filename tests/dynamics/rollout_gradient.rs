@@ -39,6 +39,7 @@ fn check(scene: &Scene, fidelity: Fidelity, integrator: Integrator, steps: usize
             directions,
             seed: 7,
             timings: 0,
+            enough: Some(1e-6),
         },
     )
     .unwrap();

@@ -4,7 +4,7 @@ use crate::support::INTEGRATORS;
 use crate::support::forward::{self, check_forward};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, BodyId, Contact, Drag, DragPart, Fluid, Joint, Scene};
-use hydrograd::{Controls, Fidelity, Settings, Shape, Simulator, objective};
+use hydrograd::{Controls, Fidelity, Rollout, Settings, Shape, Simulator, objective};
 
 const STEPS: usize = 8;
 
@@ -48,23 +48,27 @@ fn settings(fidelity: Fidelity, integrator: Integrator) -> Settings {
         .shape_parameters(vec!["*".into()])
 }
 
-fn value(simulator: &Simulator) -> (f64, hydrograd::simulate::Gradient) {
-    let rollout = simulator
-        .rollout(&Controls::zeros(simulator, STEPS))
-        .unwrap();
+fn goal(rollout: &Rollout) -> objective::Sum {
     let mut goal = objective::mean_position(BodyId(0), [0.3, 0.1, -0.2]);
     for i in 0..rollout.samples()[0].v.len() {
         goal = goal + objective::final_velocity(i, 0.1 * i as f64, 0.3 + 0.1 * i as f64);
     }
-    let gradient = rollout.gradient(&goal).unwrap();
-    (rollout.value(&goal).unwrap(), gradient)
+    goal
+}
+
+fn run(simulator: &Simulator) -> Rollout {
+    let controls = Controls::zeros(simulator, STEPS);
+    simulator.rollout(&controls).unwrap()
 }
 
 /// Worst difference between the gradient and that of rebuilt scenes, relative to it (per relative change), or to a twentieth of the largest one, or to a thousandth of the
 /// value; `part` of a length is the step of the differences.
 fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
     let simulator = Simulator::new(scene, settings.clone()).unwrap();
-    let (size, gradient) = value(&simulator);
+    let rollout = run(&simulator);
+    let goal = goal(&rollout);
+    let size = rollout.value(&goal).unwrap();
+    let gradient = rollout.gradient(&goal).unwrap();
     let mut found = Vec::new();
     let plain = Settings {
         shape_parameters: None,
@@ -79,7 +83,8 @@ fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
         let size = if at.abs() > 0.05 { at.abs() } else { 0.3 };
         let along = |h: f64| {
             let changed = scene.with_shape_parameter(name, at + h).unwrap();
-            value(&Simulator::new(&changed, plain.clone()).unwrap()).0
+            let simulator = Simulator::new(&changed, plain.clone()).unwrap();
+            run(&simulator).value(&goal).unwrap()
         };
         let h = part * size;
         let central = |h: f64| (along(h) - along(-h)) / (2.0 * h);

@@ -289,6 +289,7 @@ fn check(simulator: &mut Simulator, name: &str, steps: usize) {
             directions: 1,
             seed: 11,
             timings: 0,
+            enough: Some(1e-7),
         },
     )
     .unwrap();

@@ -84,6 +84,7 @@ fn gradients(scene: &Scene) {
             directions: 2,
             seed: 1,
             timings: 0,
+            enough: Some(1e-7),
         };
         let report = gradcheck(&mut simulator, &settings).unwrap();
         assert!(report.max_rel_error < 1e-7, "{integrator:?}: {report:?}");

@@ -188,6 +188,7 @@ fn rollouts_through_the_surface_have_gradients() {
             directions: 3,
             seed: 5,
             timings: 0,
+            enough: Some(1e-6),
         };
         let report = gradcheck(&mut sim, &settings).unwrap();
         assert!(report.max_rel_error < 1e-6, "{integrator:?}: {report:?}");

@@ -462,11 +462,11 @@ struct Checked {
 
 impl Checked {
     fn of(name: &str, rung: &Rung) -> Self {
-        let (right, drawn) = tools::drawn_by(|| (rung.check)(1.0));
+        let [(right, drawn), (corrupted, _)] = tools::both(rung.check, 1.01);
         Self {
             name: name.into(),
             right,
-            corrupted: (rung.check)(1.01),
+            corrupted,
             drawn,
         }
     }

@@ -84,6 +84,7 @@ pub fn check_gradient(
         directions,
         seed: 3,
         timings: 0,
+        enough: Some(limit),
     };
     let report = gradcheck::gradcheck(simulator, &settings).unwrap();
     println!("{what}: {:.1e}", report.max_rel_error);

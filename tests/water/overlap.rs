@@ -153,6 +153,7 @@ fn the_gradient_is_exact_with_declared_links() {
                 directions: 1,
                 seed: 7,
                 timings: 0,
+                enough: Some(1e-6),
             },
         )
         .unwrap();

@@ -355,6 +355,7 @@ fn boxes_that_approach_are_differentiated() {
         directions: 1,
         seed: 3,
         timings: 0,
+        enough: Some(1e-7),
     };
     let report = gradcheck::gradcheck(&mut simulator, &checked).unwrap();
     println!("{:.1e}", report.max_rel_error);

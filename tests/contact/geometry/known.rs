@@ -141,6 +141,7 @@ fn ellipsoids_are_as_far_apart_as_their_surfaces() {
     let mut draw = Draw::new(11);
     let axes = [[0.2, 0.05, 0.2], [0.12, 0.18, 0.25], [0.3, 0.1, 0.04]];
     let ball = plain(&Shape::sphere(0.07));
+    let directions = directions(1_000_000);
     for (k, semi_axes) in axes.iter().enumerate() {
         let body = plain(&Shape::ellipsoid(*semi_axes));
         let other_axes = axes[(k + 1) % 3];
@@ -150,8 +151,8 @@ fn ellipsoids_are_as_far_apart_as_their_surfaces() {
             let away = draw.vector().normalize();
             let there = Pose::new(exp_matrix(&draw.vector()), pose.translation + 0.6 * away);
             let points = between(&ball, &body, &there, &pose, 1.0).unwrap();
-            let nearest = directions(1_000_000)
-                .into_iter()
+            let nearest = directions
+                .iter()
                 .map(|d| pose.apply(&d.component_mul(&Vec3::from(*semi_axes))))
                 .map(|x| (x - there.translation).norm() - 0.07)
                 .fold(f64::INFINITY, f64::min);
@@ -168,9 +169,9 @@ fn ellipsoids_are_as_far_apart_as_their_surfaces() {
                     - h(&there, &other_axes)
                     - h(&pose, semi_axes)
             };
-            let largest = directions(1_000_000)
-                .into_iter()
-                .map(|n| height(&n))
+            let largest = directions
+                .iter()
+                .map(height)
                 .fold(f64::NEG_INFINITY, f64::max);
             let error = p.gap - largest;
             assert!((-1e-12..1e-5).contains(&error), "{error:e}");

@@ -27,6 +27,7 @@ fn agrees(name: &str, simulator: &mut Simulator, steps: usize) {
         directions: 4,
         seed: 7,
         timings: 0,
+        enough: Some(1e-5),
     };
     let report = gradcheck(simulator, &asked).unwrap();
     println!("{name}: {:.1e}", report.max_rel_error);

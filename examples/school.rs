@@ -159,14 +159,14 @@ fn main() -> Result<()> {
     write("straight.glb", &straight)?;
     let started = Instant::now();
     let still = straight.value(&Moved)?;
-    let (mut pushed, mut length) = (straight, 0.3 * FORCE);
+    let (mut pushed, mut length) = (straight, 0.1 * FORCE);
     for _ in 0..IMPROVEMENTS {
         let upwards = pushing(pushed.gradient(&Moved)?.controls);
         let step = upwards.scale(length / mean(&upwards).max(f64::MIN_POSITIVE));
         let forces = within(pushed.controls() + step);
         let next = simulator.rollout(&Controls::from_matrix(&simulator, forces)?)?;
         match next.value(&Moved)? > pushed.value(&Moved)? {
-            true => pushed = next,
+            true => (pushed, length) = (next, 2.0 * length),
             false => length *= 0.3,
         }
     }

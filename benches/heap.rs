@@ -90,7 +90,7 @@ fn main() -> hydrograd::Result<()> {
             Some(name) => name.parse().expect("the name of a fidelity"),
             None => Fidelity::Isolated,
         },
-        accuracy: after("--accuracy").and_then(|x| x.parse().ok()),
+        accuracy: after("--accuracy").map(|x| x.parse().expect("an accuracy, such as 0.01")),
         exchange: match after("--exchange") {
             Some(name) => name.parse().expect("the name of an exchange"),
             None => Exchange::Auto,

@@ -35,7 +35,7 @@ fn kinds(tolerance: f64) -> [Arc<ReducedBody>; 2] {
     })
 }
 
-/// A thin plate and a cylinder of largest radius about 1, of more than a hundred points each.
+/// A thin plate and a cylinder of largest radius about 1, of more than sixty points each.
 fn edged(accuracy: f64) -> [Arc<ReducedBody>; 2] {
     let mut scene = Scene::new(Fluid::fresh_water());
     for (k, shape) in [Shape::cuboid([1.4, 1.2, 0.2]), Shape::cylinder(0.6, 1.4)]

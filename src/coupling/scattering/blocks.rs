@@ -6,11 +6,10 @@
 use super::Scattering;
 use super::far::Derivatives;
 use super::pairs::Near;
-use super::parts::{FEW, in_parts};
+use super::parts::{FEW, in_parts, of_each};
 use super::places::Places;
 use super::sums::Sums;
 use crate::adjoint::multipole::{self, WIDTH};
-use crate::coupling::settings::end;
 use faer::linalg::matmul::matmul;
 use faer::prelude::IntoConst;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -43,7 +42,7 @@ struct Room {
 
 impl Scattering {
     /// P of a body or of what a mirror shows of it; none that is the identity.
-    fn carrier(&self, b: usize) -> Option<MatRef<'_, f64>> {
+    pub(super) fn carrier(&self, b: usize) -> Option<MatRef<'_, f64>> {
         let body = &self.bodies[b % self.bodies.len()];
         let basis = body.basis();
         (basis.ncols() < basis.nrows()).then(|| {
@@ -56,20 +55,17 @@ impl Blocks {
     pub fn new(sums: &Sums<'_, f64>) -> Self {
         let model = sums.model;
         let n = model.table.moments();
-        let mut moments = vec![0.0; n * end(&model.numbers)];
-        // Of the points, then of the numbers.
-        for (b, own) in model.numbers.iter().enumerate() {
+        let moments = of_each(model.numbers.len(), |b| {
             let of_points = sums.moments_of_points(b);
-            let out = &mut moments[n * own.start..n * own.end];
-            match model.carrier(b) {
-                None => out.copy_from_slice(&of_points),
-                Some(carrier) => {
-                    let of_points = MatRef::from_column_major_slice(&of_points, n, carrier.nrows());
-                    let out = MatMut::from_column_major_slice_mut(out, n, own.len());
-                    matmul(out, Accum::Replace, of_points, carrier, 1.0, Par::Seq);
-                }
-            }
-        }
+            let Some(carrier) = model.carrier(b) else {
+                return of_points;
+            };
+            let of_points = MatRef::from_column_major_slice(&of_points, n, carrier.nrows());
+            let mut own = vec![0.0; n * carrier.ncols()];
+            let out = MatMut::from_column_major_slice_mut(&mut own, n, carrier.ncols());
+            matmul(out, Accum::Replace, of_points, carrier, 1.0, Par::Seq);
+            own
+        });
         let all = &sums.pairs.near;
         let near = in_parts(all, |_, pairs: &[Near]| {
             let first = pairs.first().map_or(0, |near| near.number);
@@ -82,12 +78,12 @@ impl Blocks {
         });
         Self {
             far: Derivatives::new(&model.table, sums.places, &sums.pairs.far),
-            moments,
+            moments: moments.concat(),
             near,
         }
     }
 
-    /// What the numbers see of each other.
+    /// What the numbers see of each other: a symmetric product, its own transpose.
     pub fn seen(&self, sums: &Sums<'_, f64>, numbers: &[f64]) -> Vec<f64> {
         let model = sums.model;
         let numbers = &*model.spread(numbers);

@@ -238,7 +238,7 @@ impl Scattered<'_> {
         modes: &[f64],
     ) -> (Vec<f64>, DVector<f64>) {
         let model = self.model;
-        let points = |b: usize| model.numbers[b].len() == model.points[b].len();
+        let points = |b: usize| model.carrier(b).is_none();
         let numbers = self.joined(twists, modes, points);
         self.parted(&model.numbers, &self.blocks.seen(sums, &numbers), points)
     }

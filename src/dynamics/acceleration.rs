@@ -130,7 +130,11 @@ impl Linearisation<'_> {
         entries: &[usize],
     ) -> Result<Slopes> {
         let row = |i: &usize| self.inertial_force_vjp(v, control, &unit(v.len(), *i));
-        let rows = in_order(entries.par_iter().map(row))?;
+        // What answers are known when another is asked for is the same for any number of threads.
+        let rows = match self.scattered() {
+            Some(_) => entries.iter().map(row).collect::<Result<_>>()?,
+            None => in_order(entries.par_iter().map(row))?,
+        };
         let zero = ForceCotangents::zeros(self);
         Ok(Slopes::from_rows(v.len(), entries, &rows, &zero))
     }

@@ -27,6 +27,9 @@ use crate::coupling::Direction;
 use crate::multibody::{Cotangents, Fields, Link, Virtual};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
+/// Fields of each ẑ, cotangents of them, and of the rest.
+pub(super) type Dry = (Vec<Fields>, Vec<Cotangents>, Vec<ForceCotangents>);
+
 /// What is known of the ẑ of several transposes, and asked of them.
 #[derive(Clone, Copy)]
 pub(super) enum Rows {
@@ -416,10 +419,29 @@ impl Linearisation<'_> {
         z: &[DVector<f64>],
         rows: Rows,
     ) -> Result<Vec<ForceCotangents>> {
-        let (tree, n) = (&self.system.tree, self.system.len());
-        let Some(first) = z.first() else {
+        let tree = &self.system.tree;
+        let Some((fields, mut bars, mut out)) = self.dry_vjps(v, control, z, rows) else {
             return Ok(Vec::new());
         };
+        self.fluid_force_vjps(v, &fields, &mut bars, &mut out, rows)?;
+        for (((z, fields), bar), out) in z.iter().zip(&fields).zip(bars).zip(&mut out) {
+            let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), fields, bar);
+            out.q += q_bar;
+            out.v += v_bar;
+        }
+        Ok(out)
+    }
+
+    /// All of it but the water's part; none of none.
+    pub(super) fn dry_vjps(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        z: &[DVector<f64>],
+        rows: Rows,
+    ) -> Option<Dry> {
+        let (tree, n) = (&self.system.tree, self.system.len());
+        let first = z.first()?;
         let field = |z| Virtual::Frame(z);
         let mut fields = vec![tree.fields(&self.kinematics, &self.q, v, field(first))];
         for z in &z[1..] {
@@ -477,12 +499,6 @@ impl Linearisation<'_> {
         for (out, tau_bar) in out.iter_mut().zip(&tau_bars) {
             out.q -= self.frame_velocity_vjp(tau_bar, &joints);
         }
-        self.fluid_force_vjps(v, &fields, &mut bars, &mut out, rows)?;
-        for (((z, fields), bar), out) in z.iter().zip(&fields).zip(bars).zip(&mut out) {
-            let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, Virtual::Frame(z), fields, bar);
-            out.q += q_bar;
-            out.v += v_bar;
-        }
-        Ok(out)
+        Some((fields, bars, out))
     }
 }

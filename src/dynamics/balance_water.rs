@@ -9,6 +9,20 @@ use crate::coupling::{Carried, Tangent};
 use crate::multibody::{Cotangents, Fields};
 use nalgebra::{DMatrix, DVector};
 
+/// What the water tells of a body: at unit density, spatial but for the impulse.
+pub(super) struct Told {
+    /// Its momentum in the water.
+    pub momentum: Vec6,
+    /// D'.
+    pub carried: Vec6,
+    /// What its momentum changes by as bodies are displaced and move with D' besides, body frame.
+    pub impulse: Vec6,
+    /// By what half the slope of the energy changes so.
+    pub wrench: Vec6,
+    /// ½ D_g E(v, v).
+    pub pose_force: Vec6,
+}
+
 /// Impulses, wrenches and a tangent of one column whose sums alone are known.
 fn summed(found: Carried) -> (DMatrix<f64>, Vec<Vec<Vec6>>, Vec<Tangent>) {
     let none = DVector::zeros(found.momentum.len());
@@ -35,16 +49,10 @@ impl Linearisation<'_> {
         let Some(water) = self.water()? else {
             return Ok(());
         };
-        let rho = self.parameters.density();
         let direction = self.through_water(v);
         let momenta = self.momenta_in(water, &direction);
-        let current = self.current_twist();
         // (D − U × Z) · h_f: one bilinear form with the direction D' = D − U × Z.
-        let carried = |fields: &Fields| -> Vec<Vec6> {
-            let both = fields.turning.iter().zip(&fields.virtual_twist);
-            both.map(|(d, z)| d - cross_motion(&current, z)).collect()
-        };
-        let carried: Vec<Vec<Vec6>> = fields.iter().map(carried).collect();
+        let carried: Vec<Vec<Vec6>> = fields.iter().map(|f| self.carried_on(f)).collect();
         let columns = carried.iter().map(|field| self.submerged_twists(field));
         let columns = DMatrix::from_columns(&columns.collect::<Vec<_>>());
         let virt = fields
@@ -83,34 +91,63 @@ impl Linearisation<'_> {
             }
         }
         for (k, tangent) in tangents.iter().enumerate() {
-            let (fields, carried, bar) = (&fields[k], &carried[k], &mut bars[k]);
             for (b, w) in self.system.submerged() {
-                let pose = &self.kinematics.poses[b];
                 let carried_on = impulses.fixed_view::<6, 1>(6 * w, k).into_owned();
-                let momentum_carried = pose.wrench_to_world(&carried_on);
                 let impulse = tangent.momentum_x.fixed_rows::<6>(6 * w).into_owned();
-                let impulse = pose.wrench_to_world(&impulse);
                 // The water carries it to bodies behind other joints.
                 let answers = [carried_on, impulse, pairs[k][w], tangent.wrench[w]];
-                if rows.skips(fields, b) && answers == [Vec6::zeros(); 4] {
+                if rows.skips(&fields[k], b) && answers == [Vec6::zeros(); 4] {
                     continue;
                 }
-                let pose_force = 0.5 * tangent.gradient[w];
-                let relative = self.relative(&fields.twist[b]);
-                let virt = &fields.virtual_twist[b];
-                let rate = pose_force + cross_force(&current, &momenta[b]);
-                *out[k].parameters.density_mut() +=
-                    fields.turning[b].dot(&momenta[b]) + virt.dot(&rate);
-                bar.turning[b] += rho * momenta[b];
-                bar.virtual_twist[b] += rho * rate;
-                bar.twist[b] += rho * (momentum_carried + impulse);
-                bar.pose[b] += rho
-                    * (pairs[k][w] + 0.5 * tangent.wrench[w]
-                        - cross_force(&relative, &(momentum_carried + impulse))
-                        - cross_force(&carried[b], &momenta[b])
-                        - cross_force(virt, &pose_force));
+                let told = Told {
+                    momentum: momenta[b],
+                    carried: carried[k][b],
+                    impulse: carried_on + impulse,
+                    wrench: pairs[k][w] + 0.5 * tangent.wrench[w],
+                    pose_force: 0.5 * tangent.gradient[w],
+                };
+                self.add_told(b, &told, &fields[k], &mut bars[k], &mut out[k]);
             }
         }
         Ok(())
+    }
+
+    /// Adds what the water tells of body `b`.
+    pub(super) fn add_told(
+        &self,
+        b: usize,
+        told: &Told,
+        fields: &Fields,
+        bar: &mut Cotangents,
+        out: &mut ForceCotangents,
+    ) {
+        let (rho, current) = (self.parameters.density(), self.current_twist());
+        let Told {
+            momentum,
+            carried,
+            impulse,
+            wrench,
+            pose_force,
+        } = told;
+        let impulse = &self.kinematics.poses[b].wrench_to_world(impulse);
+        let relative = self.relative(&fields.twist[b]);
+        let virt = &fields.virtual_twist[b];
+        let rate = pose_force + cross_force(&current, momentum);
+        *out.parameters.density_mut() += fields.turning[b].dot(momentum) + virt.dot(&rate);
+        bar.turning[b] += rho * momentum;
+        bar.virtual_twist[b] += rho * rate;
+        bar.twist[b] += rho * impulse;
+        bar.pose[b] += rho
+            * (wrench
+                - cross_force(&relative, impulse)
+                - cross_force(carried, momentum)
+                - cross_force(virt, pose_force));
+    }
+
+    /// D' = D − U × Z.
+    pub(super) fn carried_on(&self, fields: &Fields) -> Vec<Vec6> {
+        let current = self.current_twist();
+        let both = fields.turning.iter().zip(&fields.virtual_twist);
+        both.map(|(d, z)| d - cross_motion(&current, z)).collect()
     }
 }

@@ -3,6 +3,7 @@
 mod acceleration;
 mod armature;
 mod balance;
+mod balance_recoil;
 mod balance_water;
 mod body;
 mod body_loads;

@@ -11,13 +11,13 @@ use crate::multibody::{Cotangents, Fields, Virtual};
 use nalgebra::{DMatrix, DVector};
 
 /// Two velocities whose product with the inertia is differentiated: v with its fields, and w.
-struct Pair<'p> {
-    fields: &'p Fields,
-    v: &'p DVector<f64>,
-    w: DVector<f64>,
+pub(super) struct Pair<'p> {
+    pub fields: &'p Fields,
+    pub v: &'p DVector<f64>,
+    pub w: DVector<f64>,
     /// Whether w is a unit vector, which moves the bodies behind one joint alone.
-    is_unit: bool,
-    by_parameters: bool,
+    pub is_unit: bool,
+    pub by_parameters: bool,
 }
 
 impl Pair<'_> {
@@ -220,13 +220,13 @@ impl Linearisation<'_> {
     }
 
     /// Fields at the velocity `v`, without a virtual one.
-    fn still_fields(&self, v: &DVector<f64>) -> Fields {
+    pub(super) fn still_fields(&self, v: &DVector<f64>) -> Fields {
         let zero = DVector::zeros(v.len());
         (self.system.tree).fields(&self.kinematics, &self.q, v, Virtual::Frame(&zero))
     }
 
     /// With the water's momenta of both velocities, and the slopes of their energy.
-    fn bilinear_row(
+    pub(super) fn bilinear_row(
         &self,
         at: &Pair,
         current: Option<Vec6>,

@@ -5,13 +5,16 @@
 //! what turns and damps in an implicit stage.
 
 use super::Evaluation;
-use crate::adjoint::lie::Mat6;
-use crate::coupling::scattering::{Recoiled, Scattered};
+use crate::adjoint::lie::{Mat6, Vec6};
+use crate::coupling::Carried;
+use crate::coupling::scattering::{Goal, Recoiled, Scattered};
 use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Least inertia, of a body's largest, that a twist is measured by.
 const LEAST: f64 = 1e-6;
+/// Part of a velocity's tolerance that a change of it may leave.
+const CHANGE: f64 = 0.05;
 
 /// v with M₀ v = the impulses given on the free velocities, and zero on driven ones.
 pub(super) type Own<'a> = Box<dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync + 'a>;
@@ -75,19 +78,71 @@ impl<'a> Recoiling<'a> {
     /// v with given velocities `driven` (zero where free), and M v = `right` + M₀ `driven` on the free rows.
     pub fn solve_beside(&self, right: &DVector<f64>, driven: &DVector<f64>) -> DVector<f64> {
         let first = driven + (self.own)(right);
-        let (v, found) = self.recoiled(first);
+        let (v, found) = self.recoiled(first, None, Goal::Full);
         self.at.settle(self.twists(&v), found);
         v
     }
 
-    /// [`Recoiling::solve`] for a change of the velocity, of which the water is asked no more.
-    pub(super) fn change(&self, right: &DVector<f64>) -> DVector<f64> {
-        self.recoiled((self.own)(right)).0
+    /// [`Recoiling::solve`] for a change of the velocity `of`, if it is one: to a residual that is small beside it. The water remembers it.
+    pub(super) fn change(&self, right: &DVector<f64>, of: Option<&DVector<f64>>) -> DVector<f64> {
+        let goal = of.map_or(Goal::Full, |v| {
+            Goal::Absolute(CHANGE * self.at.levels().tolerance * self.size(v))
+        });
+        let (v, found) = self.recoiled((self.own)(right), None, goal);
+        self.at.remember(found);
+        v
     }
 
-    fn recoiled(&self, first: DVector<f64>) -> (DVector<f64>, Recoiled) {
+    /// [`Recoiling::solve`] to a relative residual, with what earlier ones left (none being as good as zeros); and what this leaves, of which the impulses of the
+    /// velocity are made that come with it.
+    pub(super) fn step(
+        &self,
+        right: &DVector<f64>,
+        behind: &[f64],
+        goal: f64,
+    ) -> (DVector<f64>, Vec<f64>) {
+        let behind = Some(behind).filter(|b| !b.is_empty());
+        let (v, found) = self.recoiled((self.own)(right), behind, Goal::Relative(goal));
+        (v, found.left)
+    }
+
+    /// Of a velocity in the units of what is left.
+    pub(super) fn size(&self, v: &DVector<f64>) -> f64 {
+        self.twists(v).component_mul(&self.scale).norm()
+    }
+
+    /// w with M w = `right` + ρ Jᵀ h on the free rows, h the rates of the bodies' impulses in the water as they move with the velocity of the coefficients `direction`, are displaced along
+    /// `z` and change their twists (body frames) at the rates `twists` − J w; and what the water is then asked for, as [`Linearised::carried`] tells it for those rates.
+    ///
+    /// [`Linearised::carried`]: crate::coupling::Linearised::carried
+    pub(super) fn carried(
+        &self,
+        right: &DVector<f64>,
+        direction: &DVector<f64>,
+        twists: &DVector<f64>,
+        z: &[Vec6],
+    ) -> (DVector<f64>, Carried) {
+        let at = &self.at;
+        let displaced = at.displaced(&at.motions().twists(direction), z);
+        let (asked, mut impulses) = displaced.asked();
+        at.add_own(twists, &mut impulses);
+        let first = (self.own)(right) + self.answered(&impulses);
         let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
-        let found = (self.at).recoil(&self.twists(&first), &self.scale, recoil);
+        let start = twists - self.twists(&first);
+        let found = at.recoil(&start, Some(&asked), &self.scale, recoil, Goal::Full);
+        let w = first + self.answered(&found.exchanged);
+        let carried = displaced.carried(&(twists - self.twists(&w)), &found);
+        (w, carried)
+    }
+
+    fn recoiled(
+        &self,
+        first: DVector<f64>,
+        behind: Option<&[f64]>,
+        goal: Goal,
+    ) -> (DVector<f64>, Recoiled) {
+        let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
+        let found = (self.at).recoil(&self.twists(&first), behind, &self.scale, recoil, goal);
         (first - self.answered(&found.exchanged), found)
     }
 }

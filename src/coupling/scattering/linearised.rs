@@ -1,8 +1,9 @@
 //! Derivatives of the energy of many bodies: of directions that are given by coefficients or by twists.
 
 use super::Scattering;
+use super::answers::{Answer, Recoiled};
 use super::places::Places;
-use super::scattered::{Answer, Motions, Scattered, mixed, plus};
+use super::scattered::{Motions, Scattered, mixed, plus};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::reduced::FLUX;
@@ -33,6 +34,77 @@ pub struct ScatteredLinearised<'a> {
     at: Arc<Scattered<'a>>,
     momenta: DMatrix<f64>,
     report: CouplingReport,
+}
+
+/// Bodies that move as they did, about to be displaced: where to, and what their points see of it while they are still.
+pub struct Displaced<'s, 'a> {
+    at: &'s Scattered<'a>,
+    places: Places<Dual64>,
+    answer: Arc<Answer>,
+    seen: Vec<f64>,
+}
+
+impl<'a> Scattered<'a> {
+    /// Bodies with these twists (body frames) that are displaced along `z`.
+    pub fn displaced(&self, twists: &DVector<f64>, z: &[Vec6]) -> Displaced<'_, 'a> {
+        let (answer, places) = (self.respond(twists), self.moving(z));
+        let seen = self.tangent_potentials(&places, &answer.charges);
+        Displaced {
+            at: self,
+            places,
+            answer,
+            seen,
+        }
+    }
+}
+
+impl Displaced<'_, '_> {
+    /// What the displacement alone asks of bodies whose twists stay as they are: in the equations of [`Scattered::recoil`], and as impulses (body frames, unit density).
+    pub fn asked(&self) -> (Vec<f64>, DVector<f64>) {
+        let (modes, impulses) = self.at.projected(&self.seen);
+        let unit = FLUX.sqrt();
+        (modes.into_iter().map(|a| unit * a).collect(), impulses)
+    }
+
+    /// [`Linearised::carried`] as the twists change at the rates `twists`, which recoiled so.
+    pub fn carried(&self, twists: &DVector<f64>, recoiled: &Recoiled) -> Carried {
+        let rates = self.at.charges(twists, recoiled.modes());
+        carried(self.at, &self.places, &self.answer.charges, twists, &rates)
+    }
+}
+
+/// Of charges with themselves, as bodies are displaced and charges change at these rates, those of the twists among them.
+fn carried(
+    at: &Scattered,
+    places: &Places<Dual64>,
+    charges: &[f64],
+    twists: &DVector<f64>,
+    rates: &[f64],
+) -> Carried {
+    let Bent {
+        mut impulses,
+        gradient,
+        rate,
+    } = bent(at, places, charges, rates);
+    at.add_own(twists, &mut impulses);
+    Carried {
+        momentum: impulses,
+        wrench: rate.into_iter().map(|w| 0.5 * w).collect(),
+        gradient,
+    }
+}
+
+/// The same without what the twists do of each body alone.
+fn bent(at: &Scattered, places: &Places<Dual64>, charges: &[f64], rates: &[f64]) -> Bent {
+    let found = at.gradient_jvp(places, charges, rates);
+    let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
+    let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
+    let [gradient, rate] = found.wrenches_and_rates().map(scaled);
+    Bent {
+        impulses: at.impulses_of(&seen),
+        gradient,
+        rate,
+    }
 }
 
 /// Rates of the impulses that bodies exchange, wrenches, and their rates.
@@ -83,29 +155,11 @@ impl<'a> ScatteredLinearised<'a> {
         }
     }
 
-    /// Of one direction's charges with themselves, as bodies are displaced and further `twists` are made, if any.
-    fn bent(
-        &self,
-        places: &Places<Dual64>,
-        charges: &[f64],
-        twists: Option<&DVector<f64>>,
-    ) -> Bent {
+    /// Of one direction's charges with themselves, as bodies are displaced.
+    fn bent(&self, places: &Places<Dual64>, charges: &[f64]) -> Bent {
         let at = &self.at;
-        let seen = at.tangent_potentials(places, charges);
-        // Charges that the twists ask for, and those that answer the displacement, in one solve.
-        let rates = match twists {
-            Some(twists) => at.answering_beside(twists, &seen),
-            None => at.answering(&seen),
-        };
-        let found = at.gradient_jvp(places, charges, &rates);
-        let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
-        let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
-        let [gradient, rate] = found.wrenches_and_rates().map(scaled);
-        Bent {
-            impulses: at.impulses_of(&seen),
-            gradient,
-            rate,
-        }
+        let rates = at.answering(&at.tangent_potentials(places, charges));
+        bent(at, places, charges, &rates)
     }
 
     /// The rate of the impulses to charges as bodies are displaced.
@@ -157,18 +211,13 @@ impl Linearised for ScatteredLinearised<'_> {
     ) -> Result<Option<Carried>> {
         let at = &self.at;
         let answer = self.respond(&Direction::Basis(x));
-        let Bent {
-            mut impulses,
-            gradient,
-            rate,
-        } = self.bent(&at.moving(z), &answer.charges, Some(twists));
-        at.add_own(twists, &mut impulses);
+        let places = at.moving(z);
+        let seen = at.tangent_potentials(&places, &answer.charges);
+        // Charges that the twists ask for, and those that answer the displacement, in one solve.
+        let rates = at.answering_beside(twists, &seen);
+        let found = carried(at, &places, &answer.charges, twists, &rates);
         at.check()?;
-        Ok(Some(Carried {
-            momentum: impulses,
-            wrench: rate.into_iter().map(|w| 0.5 * w).collect(),
-            gradient,
-        }))
+        Ok(Some(found))
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
@@ -176,7 +225,7 @@ impl Linearised for ScatteredLinearised<'_> {
         let places = at.moving(z);
         let (x, y) = (self.respond(&x), self.respond(&y));
         let out = if x.charges == y.charges {
-            let bent = self.bent(&places, &x.charges, None);
+            let bent = self.bent(&places, &x.charges);
             Tangent {
                 momentum_x: bent.impulses.clone(),
                 momentum_y: bent.impulses,
@@ -184,8 +233,8 @@ impl Linearised for ScatteredLinearised<'_> {
                 wrench: bent.rate,
             }
         } else {
-            let [sum, difference] = [1.0, -1.0]
-                .map(|sign| self.bent(&places, &plus(&x.charges, sign, &y.charges), None));
+            let [sum, difference] =
+                [1.0, -1.0].map(|sign| self.bent(&places, &plus(&x.charges, sign, &y.charges)));
             Tangent {
                 momentum_x: 0.5 * (&sum.impulses + &difference.impulses),
                 momentum_y: 0.5 * (&sum.impulses - &difference.impulses),

@@ -20,6 +20,7 @@
 //! Walls and free surfaces are mirror images of the bodies, with trees of their own, that no image but bodies see: with charges c = [α, ½ σ α] on bodies and their images (σ = −1 of those that are
 //! mirrored in free surfaces an odd number of times) the energy is still ½ cᵀĜc, so that all of the above stays true of it.
 
+mod answers;
 mod blocks;
 mod cells;
 mod far;
@@ -33,9 +34,10 @@ mod places;
 mod scattered;
 mod sums;
 
+pub use answers::{Answer, Goal, Recoiled};
 pub use levels::{Apart, Levels};
-pub use linearised::ScatteredLinearised;
-pub use scattered::{Answer, Motions, Recoiled, Scattered};
+pub use linearised::{Displaced, ScatteredLinearised};
+pub use scattered::{Motions, Scattered};
 
 use super::Exclusions;
 use super::isolated::Isolated;

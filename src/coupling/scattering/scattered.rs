@@ -1,6 +1,7 @@
-//! Many bodies at some poses: charges and impulses for twists, or for what recoils.
+//! Many bodies at some poses: what their modes and twists see of each other, and what they answer.
 
 use super::Scattering;
+use super::answers::{Answer, Kept};
 use super::blocks::{Blocks, dot};
 use super::pairs::{Near, Pairs};
 use super::parts::of_each;
@@ -8,21 +9,13 @@ use super::places::{Places, length, minus};
 use super::sums::{Gradient, Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::adjoint::multipole;
-use crate::coupling::CouplingReport;
 use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
-use crate::coupling::settings::met;
-use crate::solver::{Columns, gmres};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-const ITERATIONS: usize = 300;
-const RESTART: usize = 60;
-/// Answers kept: those to the velocity, to a virtual one and to what is driven, at both ends of a pair.
-const KEPT: usize = 6;
+use std::sync::Mutex;
 
 /// Twists of all bodies as linear functions of a few coefficients: those of joints, and of a current.
 pub trait Motions: Send + Sync {
@@ -33,25 +26,6 @@ pub trait Motions: Send + Sync {
     fn transposed(&self, impulses: &DVector<f64>) -> DVector<f64>;
 }
 
-/// What all bodies are in the water as they move.
-#[derive(Clone, Debug)]
-pub struct Answer {
-    /// Body-frame twists, 6 a body.
-    pub twists: DVector<f64>,
-    /// α, all points.
-    pub charges: Vec<f64>,
-    /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
-    pub exchanged: DVector<f64>,
-}
-
-/// What [`Scattered::recoil`] finds.
-#[derive(Clone, Debug)]
-pub struct Recoiled {
-    /// Impulses that others exchange with each body, body frames, unit density.
-    pub exchanged: DVector<f64>,
-    modes: Vec<f64>,
-}
-
 /// Many bodies at some poses.
 pub struct Scattered<'a> {
     pub(super) model: &'a Scattering,
@@ -60,14 +34,7 @@ pub struct Scattered<'a> {
     places: Places<f64>,
     blocks: Blocks,
     pub(super) motions: Box<dyn Motions + 'a>,
-    kept: Mutex<Kept>,
-}
-
-#[derive(Default)]
-struct Kept {
-    answers: Vec<Arc<Answer>>,
-    report: CouplingReport,
-    failed: Option<(usize, f64)>,
+    pub(super) kept: Mutex<Kept>,
 }
 
 impl Scattering {
@@ -109,10 +76,6 @@ impl<'a> Scattered<'a> {
 }
 
 impl Scattered<'_> {
-    fn kept(&self) -> MutexGuard<'_, Kept> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// What moves the bodies.
     pub fn motions(&self) -> &dyn Motions {
         self.motions.as_ref()
@@ -123,40 +86,8 @@ impl Scattered<'_> {
         self.model.own()
     }
 
-    /// What solves cost so far.
-    pub fn report(&self) -> CouplingReport {
-        self.kept().report.clone()
-    }
-
-    /// Whether all solves so far met their tolerance.
-    ///
-    /// # Errors
-    /// [`Error::Solver`] for the first that didn't.
-    pub fn check(&self) -> Result<()> {
-        match self.kept().failed {
-            None => Ok(()),
-            Some((iterations, residual)) => Err(Error::Solver {
-                what: match self.nearest() {
-                    Some([a, b]) => format!(
-                        "exchange between {} bodies, nearest to each other {:?} and {:?}",
-                        self.model.names.len(),
-                        self.model.names[a],
-                        self.model.names[b]
-                    ),
-                    None => "exchange between many bodies".into(),
-                },
-                iterations,
-                residual,
-                tolerance: self.model.levels.tolerance,
-                remedy: "bodies are nearer than their compressed sources resolve, or overlap: keep them \
-                         apart by contact, or give a smaller resolved_gap"
-                    .into(),
-            }),
-        }
-    }
-
     /// The two bodies whose points are nearest to each other against their sizes, of those that are seen point by point.
-    fn nearest(&self) -> Option<[usize; 2]> {
+    pub(super) fn nearest(&self) -> Option<[usize; 2]> {
         let model = self.model;
         let ratio = |near: &Near| {
             let [a, b] = near.bodies;
@@ -169,12 +100,12 @@ impl Scattered<'_> {
         nearest.map(|near| near.bodies.map(|b| b % self.poses.len()))
     }
 
-    fn sums(&self) -> Sums<'_, f64> {
+    pub(super) fn sums(&self) -> Sums<'_, f64> {
         Sums::new(self.model, &self.pairs, &self.places)
     }
 
     /// [L, Ū]ᵀ ψ of every body: of the modes, and of the twists.
-    fn projected(&self, potentials: &[f64]) -> (Vec<f64>, DVector<f64>) {
+    pub(super) fn projected(&self, potentials: &[f64]) -> (Vec<f64>, DVector<f64>) {
         let model = self.model;
         self.parted(&model.points, potentials, |_| true)
     }
@@ -207,7 +138,7 @@ impl Scattered<'_> {
     }
 
     /// α = Ū x̄ + L a.
-    fn charges(&self, twists: &DVector<f64>, modes: &[f64]) -> Vec<f64> {
+    pub(super) fn charges(&self, twists: &DVector<f64>, modes: &[f64]) -> Vec<f64> {
         self.joined(twists, modes, |_| true)
     }
 
@@ -231,7 +162,7 @@ impl Scattered<'_> {
     }
 
     /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other.
-    fn exchanged(
+    pub(super) fn exchanged(
         &self,
         sums: &Sums<'_, f64>,
         twists: &DVector<f64>,
@@ -241,117 +172,6 @@ impl Scattered<'_> {
         let points = |b: usize| model.carrier(b).is_none();
         let numbers = self.joined(twists, modes, points);
         self.parted(&model.numbers, &self.blocks.seen(sums, &numbers), points)
-    }
-
-    /// a = Lᵀ(ψ + Ĝ L a), from what else the modes see.
-    fn scattered(&self, right: &[f64]) -> Vec<f64> {
-        let still = DVector::zeros(6 * self.model.bodies.len());
-        let sums = self.sums();
-        self.solve(right, |a| self.exchanged(&sums, &still, a).0)
-    }
-
-    /// x with x = right + f(x).
-    fn solve(&self, right: &[f64], f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
-        let column = |data: Vec<f64>| Columns {
-            rows: data.len(),
-            columns: 1,
-            data,
-        };
-        let apply = |v: &Columns, _: &[usize]| {
-            let mut out = v.data.clone();
-            for (out, x) in out.iter_mut().zip(f(&v.data)) {
-                *out -= x;
-            }
-            [v.clone(), column(out)]
-        };
-        let tolerance = self.model.levels.tolerance;
-        let found = gmres(
-            apply,
-            &column(right.to_vec()),
-            tolerance,
-            ITERATIONS,
-            RESTART,
-        );
-        let mut kept = self.kept();
-        kept.report.iterations = kept.report.iterations.max(found.iterations);
-        kept.report.residual = kept.report.residual.max(found.residual);
-        if !met(found.residual, tolerance) && kept.failed.is_none() {
-            kept.failed = Some((found.iterations, found.residual));
-        }
-        found.x.data
-    }
-
-    /// The answer to body-frame twists.
-    pub fn respond(&self, twists: &DVector<f64>) -> Arc<Answer> {
-        if let Some(known) = self.kept().answers.iter().find(|a| a.twists == *twists) {
-            return known.clone();
-        }
-        if twists.iter().all(|x| *x == 0.0) {
-            return self.keep(Answer {
-                charges: vec![0.0; self.model.point_count()],
-                exchanged: twists.clone(),
-                twists: twists.clone(),
-            });
-        }
-        let sums = self.sums();
-        let none = vec![0.0; self.model.mode_count()];
-        let modes = self.scattered(&self.exchanged(&sums, twists, &none).0);
-        self.keep(Answer {
-            exchanged: self.exchanged(&sums, twists, &modes).1,
-            charges: self.charges(twists, &modes),
-            twists: twists.clone(),
-        })
-    }
-
-    fn keep(&self, answer: Answer) -> Arc<Answer> {
-        let answer = Arc::new(answer);
-        let mut kept = self.kept();
-        if kept.answers.len() >= KEPT {
-            kept.answers.remove(0);
-        }
-        kept.answers.push(answer.clone());
-        answer
-    }
-
-    /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),
-    /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side.
-    pub fn recoil(
-        &self,
-        first: &DVector<f64>,
-        scale: &DVector<f64>,
-        recoil: impl Fn(&DVector<f64>) -> DVector<f64>,
-    ) -> Recoiled {
-        let (m, n) = (self.model.mode_count(), first.len());
-        let unit = FLUX.sqrt();
-        let sums = self.sums();
-        // Modes and twists in units of about the root of their energy.
-        let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
-        let seen = |x: &[f64]| {
-            let twists = DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
-            self.exchanged(&sums, &twists, &modes(x))
-        };
-        let next = |(modes, impulses): (Vec<f64>, DVector<f64>)| -> Vec<f64> {
-            let twists = recoil(&impulses);
-            let modes = modes.into_iter().map(|a| unit * a);
-            let twists = twists.iter().zip(scale.iter()).map(|(t, s)| -t * s);
-            modes.chain(twists).collect()
-        };
-        let mut start = vec![0.0; m];
-        start.extend(first.iter().zip(scale.iter()).map(|(t, s)| t * s));
-        let x = self.solve(&start, |x| next(seen(x)));
-        Recoiled {
-            exchanged: seen(&x).1,
-            modes: modes(&x),
-        }
-    }
-
-    /// Keeps what recoiled as the answer to the twists that follow from it.
-    pub fn settle(&self, twists: DVector<f64>, recoiled: Recoiled) -> Arc<Answer> {
-        self.keep(Answer {
-            charges: self.charges(&twists, &recoiled.modes),
-            exchanged: recoiled.exchanged,
-            twists,
-        })
     }
 
     /// 4π αᵀ δĜ α as spatial wrenches.
@@ -428,7 +248,7 @@ impl Scattered<'_> {
     }
 
     /// Adds each body's own impulses.
-    pub(super) fn add_own(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
+    pub fn add_own(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
         for (b, own) in self.model.own().iter().enumerate() {
             let own: &Mat6 = own;
             let twist = twists.fixed_rows::<6>(6 * b).into_owned();

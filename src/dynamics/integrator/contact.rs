@@ -19,6 +19,8 @@ use crate::dynamics::Dual;
 use crate::dynamics::slopes::columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use std::cell::Cell;
+use std::iter::repeat;
 
 /// Most Newton iterations.
 const ITERATIONS: usize = 200;
@@ -30,14 +32,29 @@ const ENOUGH: f64 = 1e-9;
 const TRIALS: usize = 60;
 /// Part of the slope at its start that a search may leave.
 const LEFT: f64 = 0.3;
+/// Coarsest relative residual of a step that is solved for by products.
+const COARSE: f64 = 1e-2;
+/// Of [`RESIDUAL`], what such a step leaves at the finest.
+const FINE: f64 = 0.3;
 
 /// A velocity with its imbalance M (v − v*) − Δt g.
 struct Trial {
     v: DVector<f64>,
     /// M (v − v*).
     moved: DVector<f64>,
+    /// What the water's own equations lack of that where M v is a solve of theirs, in units of about the root of an energy; else nothing.
+    behind: Vec<f64>,
     imbalance: DVector<f64>,
     residual: f64,
+}
+
+/// A step of the search.
+struct Step {
+    v: DVector<f64>,
+    /// Its product with M, where that isn't found by multiplying.
+    moved: Option<DVector<f64>>,
+    /// What it leaves of the water's own equations.
+    left: Vec<f64>,
 }
 
 /// The velocity after contact, from the one before it; the same bits where nothing presses.
@@ -50,24 +67,33 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     let sized = split.sizes(&e.mass_blocks().diagonal());
     let summands = e.mass_blocks().mapped(DMatrix::abs);
     let least = sized(&summands.times(&before.abs()));
-    let at = |v: DVector<f64>, moved: Option<DVector<f64>>| {
+    // Solved by products, steps are as fine as they have to be, beside what earlier ones lack.
+    let by_products = e.scattered().is_some();
+    let in_water = Cell::new(0.0);
+    let at = |v: DVector<f64>, moved: Option<DVector<f64>>, behind: Vec<f64>| {
         let moved = moved.unwrap_or_else(|| e.mass_times(&(&v - before)));
         let imbalance = &moved - dt * e.contact_force(&v, Dual::User);
         let size = sized(&summands.times(&v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
-        let residual = share(sized(&imbalance), size);
+        let lacking = share(
+            behind.iter().map(|x| x * x).sum::<f64>().sqrt(),
+            in_water.get(),
+        );
+        let residual = share(sized(&imbalance), size).max(lacking);
         Trial {
             v,
             moved,
+            behind,
             imbalance,
             residual,
         }
     };
-    let mut now = at(before.clone(), None);
+    let mut now = at(before.clone(), None, Vec::new());
     let (mut previous, mut places) = (f64::INFINITY, Places::default());
     for iteration in 0..ITERATIONS {
         let stalled = now.residual >= 0.25 * previous;
-        let converged = now.residual == 0.0 || (now.residual <= RESIDUAL && stalled);
+        let converged =
+            now.residual == 0.0 || (now.residual <= RESIDUAL && (stalled || by_products));
         if converged || (iteration + 1 == ITERATIONS && now.residual <= ENOUGH) {
             e.check()?;
             return Ok(now.v);
@@ -75,14 +101,20 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
         if !now.residual.is_finite() {
             break;
         }
+        // As the search comes nearer (S. C. Eisenstat, H. F. Walker, "Choosing the Forcing Terms in an Inexact Newton Method", 1996).
+        let forced = match previous.is_finite() {
+            true => (now.residual / previous).powi(2),
+            false => COARSE,
+        };
+        let goal = forced.max(FINE * RESIDUAL / now.residual).min(COARSE);
         previous = now.residual;
         let hessian = Hessian::new(e, split, &now.v, dt, &mut places)?;
-        let step = hessian.step(&split.take(&now.imbalance));
-        let step = split.put(&step);
+        in_water.set(hessian.size(before));
+        let (step, left) = hessian.step(&split.take(&now.imbalance), &now.behind, goal);
+        let v = split.put(&step);
         // Where a product with M is a solve it follows from that of the step, (M − Δt ∂g/∂v) s being the imbalance.
-        let moved =
-            (e.scattered()).map(|_| &now.imbalance + dt * e.contact_force_jvp(&now.v, &step));
-        now = search(now, &step, moved.as_ref(), &at);
+        let moved = by_products.then(|| &now.imbalance + dt * e.contact_force_jvp(&now.v, &v));
+        now = search(now, &Step { v, moved, left }, &at);
     }
     Err(Error::Solver {
         what: start.stage_name(),
@@ -94,19 +126,22 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
     })
 }
 
-/// Along Newton's step, whose product with M is `moved` where it is known: the full one, or where that runs past the least value on its way, about there (regula falsi on the
+/// Along Newton's step: the full one, or where that runs past the least value on its way, about there (regula falsi on the
 /// slope, in halves where it creeps). Short of it won't do: where the slope turns steeply, regula falsi's first guess is hardly a step.
 fn search(
     now: Trial,
-    step: &DVector<f64>,
-    moved: Option<&DVector<f64>>,
-    at: &dyn Fn(DVector<f64>, Option<DVector<f64>>) -> Trial,
+    step: &Step,
+    at: &dyn Fn(DVector<f64>, Option<DVector<f64>>, Vec<f64>) -> Trial,
 ) -> Trial {
     let after = |length: f64| {
-        let moved = moved.map(|moved| &now.moved - length * moved);
-        at(&now.v - length * step, moved)
+        let moved = (step.moved.as_ref()).map(|moved| &now.moved - length * moved);
+        // Lacking nothing is the same as zeros.
+        let lacked = now.behind.iter().copied().chain(repeat(0.0));
+        let behind = (step.left.iter().zip(lacked))
+            .map(|(left, lacked)| (1.0 - length) * lacked + length * left);
+        at(&now.v - length * &step.v, moved, behind.collect())
     };
-    let slope = |t: &Trial| t.imbalance.dot(step);
+    let slope = |t: &Trial| t.imbalance.dot(&step.v);
     let start = slope(&now);
     let mut best = after(1.0);
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));

@@ -189,7 +189,7 @@ pub(super) fn solve_stage<'a>(
         } else {
             equation.factor(&now)?
         };
-        let step = factor.and_then(|factor| factor.solve(&split.take(&now.defect)));
+        let step = factor.and_then(|factor| factor.solve(&split.take(&now.defect), Some(&now.v)));
         let Some(step) = step else {
             break;
         };

@@ -73,11 +73,23 @@ impl<'a> Hessian<'a> {
         }
     }
 
-    /// The same for a step of the search, of which the water is asked no more.
-    pub fn step(&self, b: &DVector<f64>) -> DVector<f64> {
+    /// The same for a step of the search, where no matrix is formed to a relative residual, beside what earlier steps left; and what this leaves, in the units of
+    /// [`Hessian::size`].
+    pub fn step(&self, b: &DVector<f64>, behind: &[f64], goal: f64) -> (DVector<f64>, Vec<f64>) {
         match self {
-            Self::Alone(factor) => factor.solve(b),
-            Self::Recoiling(many, split) => split.take(&many.change(&split.put(b))),
+            Self::Alone(factor) => (factor.solve(b), Vec::new()),
+            Self::Recoiling(many, split) => {
+                let (step, left) = many.step(&split.put(b), behind, goal);
+                (split.take(&step), left)
+            }
+        }
+    }
+
+    /// Of a velocity, for what steps leave; zero where they leave nothing.
+    pub fn size(&self, v: &DVector<f64>) -> f64 {
+        match self {
+            Self::Alone(_) => 0.0,
+            Self::Recoiling(many, _) => many.size(v),
         }
     }
 

@@ -50,7 +50,7 @@ pub(super) fn descend(
     // Steps made, each with its dual by the inertia.
     let mut made: Vec<[DVector<f64>; 2]> = Vec::new();
     let mut improved: Vec<DVector<f64>> = Vec::new();
-    let mut back = factor.solve(&split.take(&first.defect))?;
+    let mut back = factor.solve(&split.take(&first.defect), Some(&first.v))?;
     let (mut v, mut previous) = (first.v.clone(), first.residual);
     for _ in 0..STEPS {
         let step = -&back;
@@ -64,7 +64,7 @@ pub(super) fn descend(
             return None;
         }
         let dual = step.component_mul(weight);
-        back = factor.solve(&split.take(&now.defect))?;
+        back = factor.solve(&split.take(&now.defect), Some(&now.v))?;
         for ([_, dual], u) in made.iter().zip(&improved) {
             let part = dual.dot(&back);
             back += part * u;

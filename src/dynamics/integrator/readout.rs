@@ -45,6 +45,33 @@ pub(super) fn solve_vjp(
     Ok(())
 }
 
+/// A velocity v that is read out from momenta p̂.
+pub(super) struct ReadOut<'s> {
+    pub split: &'s Split,
+    pub hat: &'s DVector<f64>,
+    pub v: &'s DVector<f64>,
+}
+
+/// Transpose of the force f(q, v, u) at a velocity that is read out, with the cotangents `z` of the one and, from elsewhere, `v_bar` of the other, added to `bar` (y is p̂ here).
+pub(super) fn force_vjp(
+    e: &Linearisation,
+    at: &ReadOut,
+    control: &DVector<f64>,
+    [z, v_bar]: [&DVector<f64>; 2],
+    bar: &mut StepBar,
+) -> Result<()> {
+    let ReadOut { split, hat, v } = *at;
+    let Some((w, found)) = e.force_readout_vjp(v, control, z, &split.free, v_bar)? else {
+        let force = e.force_vjp(v, control, z)?;
+        bar.add(1.0, &force);
+        return solve_vjp(e, split, hat, v, &(v_bar + &force.v), bar);
+    };
+    bar.add(1.0, &found);
+    bar.state.q += e.frame_velocity_vjp(&w, hat);
+    bar.state.y += e.frame_velocity(&w);
+    Ok(())
+}
+
 impl Stepper<'_> {
     /// Generalised velocity at a state.
     ///

@@ -7,7 +7,7 @@
 //! Momenta are summed as they are about a point that drifts with the water ([`crate::dynamics::Drift`]) from the start of the step on: π = (1 − τ D) p̂, whose rate is
 //! φ = (1 − τ D) f − D p̂. A step in a current is then the step that the same bodies make in still water.
 
-use super::readout;
+use super::readout::{self, ReadOut};
 use super::split::{Split, When};
 use super::stages::{Forces, Stages, StepDerivatives, Tableau};
 use super::start::Start;
@@ -219,16 +219,22 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
         for (i, stage) in self.stages.iter().enumerate().rev() {
             let e = stage.at(start);
             let mut own = StepBar::zeros(e);
-            let (mut stage_xi_bar, mut v_bar) =
-                tree.chart_rate_vjp(&stage.xi, &stage.v, &rate_bar[i]);
-            let own_bar = drift.carry_back(-stage.after, force_bar[i].clone());
-            let force = e.force_vjp(&stage.v, &start.input.control, &own_bar)?;
-            own.add(1.0, &force);
-            v_bar += &force.v;
+            let (mut stage_xi_bar, v_bar) = tree.chart_rate_vjp(&stage.xi, &stage.v, &rate_bar[i]);
+            let (z, control) = (
+                drift.carry_back(-stage.after, force_bar[i].clone()),
+                &start.input.control,
+            );
             if stage.read_out {
-                bar.v += &v_bar;
+                let force = e.force_vjp(&stage.v, control, &z)?;
+                own.add(1.0, &force);
+                bar.v += v_bar + &force.v;
             } else {
-                readout::solve_vjp(e, &stage.split, &stage.p, &stage.v, &v_bar, &mut own)?;
+                let at = ReadOut {
+                    split: &stage.split,
+                    hat: &stage.p,
+                    v: &stage.v,
+                };
+                readout::force_vjp(e, &at, control, [&z, &v_bar], &mut own)?;
             }
             stage.split.forget_moved(&mut own.state.q);
             let (q_bar, xi_bar) = tree.integrate_vjp(&stage.xi, &own.state.q);

@@ -118,7 +118,9 @@ impl<'a> AdjointStage<'a> {
         let factor = self.factor.as_ref().ok_or_else(|| singular("adjoint"))?;
         let right = split.take(v_bar);
         let found = match &self.formed {
-            Some(_) => factor.solve(&right).ok_or_else(|| singular("adjoint"))?,
+            Some(_) => factor
+                .solve(&right, None)
+                .ok_or_else(|| singular("adjoint"))?,
             None => self.solve_by_products(e, split, factor, &right)?,
         };
         Ok(split.put(&found))
@@ -150,7 +152,7 @@ impl<'a> AdjointStage<'a> {
         let scale = split.scale(&e.mass_blocks().diagonal());
         let apply = |v: &Columns, _: &[usize]| {
             let v = DVector::from_column_slice(&v.data).component_div(&scale);
-            let tried = factor.solve(&v).ok_or_else(|| singular("adjoint"));
+            let tried = factor.solve(&v, None).ok_or_else(|| singular("adjoint"));
             let tried = tried.and_then(|w| {
                 let moved = self.transposed(e, &split.put(&w))?;
                 Ok([w, split.take(&moved).component_mul(&scale)])

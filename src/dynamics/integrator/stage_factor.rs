@@ -80,11 +80,11 @@ impl<'e, 'a> StageMatrix<'e, 'a> {
 }
 
 impl StageFactor<'_> {
-    /// x with A x = `b` on the free velocities; `None` of a singular matrix.
-    pub fn solve(&self, b: &DVector<f64>) -> Option<DVector<f64>> {
+    /// x with A x = `b` on the free velocities, a change of the velocity `of`, if it is one; `None` of a singular matrix.
+    pub fn solve(&self, b: &DVector<f64>, of: Option<&DVector<f64>>) -> Option<DVector<f64>> {
         match self {
             Self::Islands(factor) => factor.solve(b),
-            Self::Recoiling(many, split) => Some(split.take(&many.change(&split.put(b)))),
+            Self::Recoiling(many, split) => Some(split.take(&many.change(&split.put(b), of))),
         }
     }
 }

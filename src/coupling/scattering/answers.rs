@@ -1,0 +1,368 @@
+//! What bodies that move, or that recoil, are in the water: solves, and answers that are kept.
+//!
+//! An answer is linear in the twists. Of others that are known at the same poses the nearest sum is a first guess, of which a solve finds what it lacks: little where a velocity
+//! differs from a known one by known steps.
+
+use super::blocks::dot;
+use super::levels::Levels;
+use super::scattered::Scattered;
+use crate::coupling::CouplingReport;
+use crate::coupling::reduced::FLUX;
+use crate::coupling::settings::met;
+use crate::solver::{Columns, gmres};
+use crate::{Error, Result};
+use nalgebra::DVector;
+use std::sync::{Arc, MutexGuard, PoisonError};
+
+const ITERATIONS: usize = 300;
+const RESTART: usize = 60;
+/// Answers kept: those to the velocity, to a virtual one and to what is driven, at both ends of a pair, and a few steps from one velocity to the next.
+const KEPT: usize = 10;
+/// Part of a twist that must be left of it beside others for it to be another direction.
+const APART: f64 = 1e-6;
+/// Of no motion, how near a sum of answers has to be to be a first guess.
+const NEARER: f64 = 0.5;
+/// Of the size of modes the least that what they answer has.
+const ASKED: f64 = 0.3;
+/// Coarsest relative residual of a solve whose absolute one is asked for.
+const COARSE: f64 = 1e-2;
+
+/// What all bodies are in the water as they move.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// Body-frame twists, 6 a body.
+    pub twists: DVector<f64>,
+    /// α, all points.
+    pub charges: Vec<f64>,
+    /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
+    pub exchanged: DVector<f64>,
+    modes: Vec<f64>,
+    /// a − Lᵀ Ĝ α of the modes.
+    left: Vec<f64>,
+}
+
+/// What [`Scattered::recoil`] finds.
+#[derive(Clone, Debug)]
+pub struct Recoiled {
+    /// Impulses that others exchange with each body, body frames, unit density.
+    pub exchanged: DVector<f64>,
+    /// What is left of the system's equations: of the modes, then of the twists, in units of about the root of their energy.
+    pub left: Vec<f64>,
+    /// Body-frame twists.
+    twists: DVector<f64>,
+    modes: Vec<f64>,
+    /// a − Lᵀ Ĝ α.
+    lacked: Vec<f64>,
+}
+
+impl Recoiled {
+    /// What the modes do.
+    pub(super) fn modes(&self) -> &[f64] {
+        &self.modes
+    }
+}
+
+/// The residual at which a solve ends, in units of about the root of an energy.
+#[derive(Clone, Copy, Debug)]
+pub enum Goal {
+    /// That of the levels.
+    Full,
+    /// Relative to what the solve starts from.
+    Relative(f64),
+    /// So much, but no finer than [`Goal::Full`].
+    Absolute(f64),
+}
+
+/// What is known at some poses.
+#[derive(Default)]
+pub(super) struct Kept {
+    answers: Vec<Arc<Answer>>,
+    report: CouplingReport,
+    failed: Option<(usize, f64)>,
+}
+
+/// A sum of answers.
+struct Sum {
+    twists: DVector<f64>,
+    modes: Vec<f64>,
+    left: Vec<f64>,
+}
+
+impl Scattered<'_> {
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What solves cost so far, and the largest residual, relative to what was asked of it.
+    pub fn report(&self) -> CouplingReport {
+        self.kept().report.clone()
+    }
+
+    /// How the exchange is cut into levels.
+    pub fn levels(&self) -> &Levels {
+        &self.model.levels
+    }
+
+    /// Whether all solves so far met their tolerance.
+    ///
+    /// # Errors
+    /// [`Error::Solver`] for the first that didn't.
+    pub fn check(&self) -> Result<()> {
+        match self.kept().failed {
+            None => Ok(()),
+            Some((iterations, residual)) => Err(Error::Solver {
+                what: match self.nearest() {
+                    Some([a, b]) => format!(
+                        "exchange between {} bodies, nearest to each other {:?} and {:?}",
+                        self.model.names.len(),
+                        self.model.names[a],
+                        self.model.names[b]
+                    ),
+                    None => "exchange between many bodies".into(),
+                },
+                iterations,
+                residual,
+                tolerance: self.model.levels.tolerance,
+                remedy: "bodies are nearer than their compressed sources resolve, or overlap: keep them \
+                         apart by contact, or give a smaller resolved_gap"
+                    .into(),
+            }),
+        }
+    }
+
+    /// a = Lᵀ(ψ + Ĝ L a), from what else the modes see.
+    pub(super) fn scattered(&self, right: &[f64]) -> Vec<f64> {
+        self.scattered_to(right, self.model.levels.tolerance)
+    }
+
+    /// The same to a relative residual.
+    fn scattered_to(&self, right: &[f64], goal: f64) -> Vec<f64> {
+        let still = DVector::zeros(6 * self.model.bodies.len());
+        let sums = self.sums();
+        self.solve(right, goal, |a| self.exchanged(&sums, &still, a).0)
+    }
+
+    /// The relative residual of a solve from `right` whose absolute one is given.
+    fn relative(&self, goal: f64, right: &[f64]) -> f64 {
+        let (size, full) = (norm(right), self.model.levels.tolerance);
+        match size > 0.0 {
+            true => (goal / size).clamp(full, COARSE),
+            false => full,
+        }
+    }
+
+    /// x with x = right + f(x), to a relative residual.
+    fn solve(&self, right: &[f64], goal: f64, f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+        let column = |data: Vec<f64>| Columns {
+            rows: data.len(),
+            columns: 1,
+            data,
+        };
+        let apply = |v: &Columns, _: &[usize]| {
+            let mut out = v.data.clone();
+            for (out, x) in out.iter_mut().zip(f(&v.data)) {
+                *out -= x;
+            }
+            [v.clone(), column(out)]
+        };
+        let right = column(right.to_vec());
+        let found = gmres(apply, &right, goal, ITERATIONS, RESTART);
+        // As if the levels' was asked for.
+        let tolerance = self.model.levels.tolerance;
+        let residual = found.residual * (tolerance / goal);
+        let mut kept = self.kept();
+        kept.report.iterations = kept.report.iterations.max(found.iterations);
+        kept.report.residual = kept.report.residual.max(residual);
+        if !met(residual, tolerance) && kept.failed.is_none() {
+            kept.failed = Some((found.iterations, found.residual));
+        }
+        found.x.data
+    }
+
+    /// About the root of twice the energy of twists, each alone and axis by axis, at unit density.
+    fn size(&self, twists: &DVector<f64>) -> f64 {
+        self.weighed(twists).norm()
+    }
+
+    fn weighed(&self, twists: &DVector<f64>) -> DVector<f64> {
+        let own = self.model.own();
+        DVector::from_fn(twists.len(), |i, _| {
+            own[i / 6][(i % 6, i % 6)].max(0.0).sqrt() * twists[i]
+        })
+    }
+
+    /// The sum of known answers that is nearest to these twists; none where it is no nearer than no motion.
+    fn known(&self, twists: &DVector<f64>) -> Option<Sum> {
+        let known = self.kept().answers.clone();
+        // Orthonormal sums of theirs, each with its coefficients.
+        let mut basis: Vec<[DVector<f64>; 2]> = Vec::new();
+        for (k, answer) in known.iter().enumerate() {
+            let mut direction = self.weighed(&answer.twists);
+            let size = direction.norm();
+            let mut sum = DVector::zeros(known.len());
+            sum[k] = 1.0;
+            // Once more for what rounding left.
+            for _ in 0..2 {
+                for [other, of] in &basis {
+                    let along = direction.dot(other);
+                    direction -= along * other;
+                    sum -= along * of;
+                }
+            }
+            let norm = direction.norm();
+            if norm > APART * size {
+                basis.push([direction / norm, sum / norm]);
+            }
+        }
+        let wanted = self.weighed(twists);
+        let mut sum = DVector::zeros(known.len());
+        for [direction, of] in &basis {
+            sum += direction.dot(&wanted) * of;
+        }
+        let mut out = Sum {
+            twists: DVector::zeros(twists.len()),
+            modes: vec![0.0; self.model.mode_count()],
+            left: vec![0.0; self.model.mode_count()],
+        };
+        for (answer, weight) in known.iter().zip(sum.iter()).filter(|(_, w)| **w != 0.0) {
+            out.twists.axpy(*weight, &answer.twists, 1.0);
+            add(*weight, &answer.modes, &mut out.modes);
+            add(*weight, &answer.left, &mut out.left);
+        }
+        let nearer = self.size(&(twists - &out.twists)) <= NEARER * wanted.norm();
+        nearer.then_some(out)
+    }
+
+    /// The answer to body-frame twists.
+    pub fn respond(&self, twists: &DVector<f64>) -> Arc<Answer> {
+        if let Some(known) = self.kept().answers.iter().find(|a| a.twists == *twists) {
+            return known.clone();
+        }
+        let none = vec![0.0; self.model.mode_count()];
+        if twists.iter().all(|x| *x == 0.0) {
+            return self.keep(Answer {
+                charges: vec![0.0; self.model.point_count()],
+                exchanged: twists.clone(),
+                twists: twists.clone(),
+                left: none.clone(),
+                modes: none,
+            });
+        }
+        let (sums, tolerance) = (self.sums(), self.model.levels.tolerance);
+        let modes = match self.known(twists) {
+            None => self.scattered(&self.exchanged(&sums, twists, &none).0),
+            Some(near) => {
+                let rest = twists - &near.twists;
+                let lacking = self.size(&rest) + FLUX.sqrt() * norm(&near.left);
+                let mut modes = near.modes;
+                if lacking > tolerance * self.size(twists) {
+                    let (mut right, _) = self.exchanged(&sums, &rest, &none);
+                    add(-1.0, &near.left, &mut right);
+                    let goal = self.relative(tolerance * ASKED * norm(&modes), &right);
+                    add(1.0, &self.scattered_to(&right, goal), &mut modes);
+                }
+                modes
+            }
+        };
+        let (seen, exchanged) = self.exchanged(&sums, twists, &modes);
+        let mut left = modes.clone();
+        add(-1.0, &seen, &mut left);
+        self.keep(Answer {
+            exchanged,
+            charges: self.charges(twists, &modes),
+            twists: twists.clone(),
+            modes,
+            left,
+        })
+    }
+
+    fn keep(&self, answer: Answer) -> Arc<Answer> {
+        let answer = Arc::new(answer);
+        let mut kept = self.kept();
+        if kept.answers.len() >= KEPT {
+            kept.answers.remove(0);
+        }
+        kept.answers.push(answer.clone());
+        answer
+    }
+
+    /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),
+    /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side, to which `behind` is added if there is any:
+    /// what was left of an earlier one.
+    pub fn recoil(
+        &self,
+        first: &DVector<f64>,
+        behind: Option<&[f64]>,
+        scale: &DVector<f64>,
+        recoil: impl Fn(&DVector<f64>) -> DVector<f64>,
+        goal: Goal,
+    ) -> Recoiled {
+        let (m, n) = (self.model.mode_count(), first.len());
+        let unit = FLUX.sqrt();
+        let sums = self.sums();
+        // Modes and twists in units of about the root of their energy.
+        let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
+        let twists = |x: &[f64]| DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
+        let seen = |x: &[f64]| self.exchanged(&sums, &twists(x), &modes(x));
+        let next = |(modes, impulses): &(Vec<f64>, DVector<f64>)| -> Vec<f64> {
+            let twists = recoil(impulses);
+            let modes = modes.iter().map(|a| unit * a);
+            let twists = twists.iter().zip(scale.iter()).map(|(t, s)| -t * s);
+            modes.chain(twists).collect()
+        };
+        let mut start = vec![0.0; m];
+        start.extend(first.iter().zip(scale.iter()).map(|(t, s)| t * s));
+        if let Some(behind) = behind {
+            add(1.0, behind, &mut start);
+        }
+        let full = self.model.levels.tolerance;
+        let goal = match goal {
+            Goal::Full => full,
+            Goal::Relative(goal) => goal,
+            Goal::Absolute(goal) => self.relative(goal, &start),
+        };
+        let x = self.solve(&start, goal, |x| next(&seen(x)));
+        let both = seen(&x);
+        let mut left = start;
+        add(1.0, &next(&both), &mut left);
+        add(-1.0, &x, &mut left);
+        let (seen, exchanged) = both;
+        let modes = modes(&x);
+        let mut lacked = modes.clone();
+        add(-1.0, &seen, &mut lacked);
+        Recoiled {
+            exchanged,
+            left,
+            twists: twists(&x),
+            modes,
+            lacked,
+        }
+    }
+
+    /// Keeps what recoiled as the answer to the twists that follow from it.
+    pub fn settle(&self, twists: DVector<f64>, recoiled: Recoiled) -> Arc<Answer> {
+        self.keep(Answer {
+            charges: self.charges(&twists, &recoiled.modes),
+            exchanged: recoiled.exchanged,
+            twists,
+            modes: recoiled.modes,
+            left: recoiled.lacked,
+        })
+    }
+
+    /// Keeps what recoiled as it is, to know more of what is near it.
+    pub fn remember(&self, recoiled: Recoiled) {
+        self.settle(recoiled.twists.clone(), recoiled);
+    }
+}
+
+fn norm(x: &[f64]) -> f64 {
+    dot(x, x).sqrt()
+}
+
+/// `to` + `weight` x.
+fn add(weight: f64, x: &[f64], to: &mut [f64]) {
+    for (to, x) in to.iter_mut().zip(x) {
+        *to += weight * x;
+    }
+}

@@ -2,7 +2,7 @@
 
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::coupling::scattering::{Levels, Motions, Scattering};
+use hydrograd::coupling::scattering::{Goal, Levels, Motions, Scattering};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::Exchange;
@@ -240,9 +240,8 @@ pub fn iterations() -> hydrograd::Result<()> {
             };
             let whole = move |i: usize| inertia(i) + if i % 6 < 3 { 0.5 * volume } else { 0.0 };
             let scale = DVector::from_fn(6 * 64, |i, _| whole(i).sqrt());
-            placed.recoil(&first, &scale, |h| {
-                DVector::from_fn(h.len(), |i, _| h[i] / whole(i))
-            });
+            let recoil = |h: &DVector<f64>| DVector::from_fn(h.len(), |i, _| h[i] / whole(i));
+            placed.recoil(&first, None, &scale, recoil, Goal::Full);
             placed.check()?;
             row.push(placed.report().iterations.to_string());
         }

@@ -12,6 +12,7 @@ mod force;
 mod forward;
 mod multibody;
 mod policy;
+mod products;
 mod scan;
 mod sensor;
 mod shape;
@@ -39,6 +40,7 @@ fn registered() -> Vec<(String, Rung)> {
         force::rungs(),
         forward::rungs(),
         policy::rungs(),
+        products::rungs(),
         sensor::rungs(),
         shape::rungs(),
         surface::rungs(),
@@ -238,6 +240,14 @@ const THROUGH: &[(&str, &str)] = &[
     (
         "dynamics::acceleration::Linearisation::fluid_inertial_vjp",
         "dynamics::acceleration::Linearisation::inertial_force_vjp",
+    ),
+    (
+        "dynamics::balance::Linearisation::dry_vjps",
+        "dynamics::balance::Linearisation::force_vjp",
+    ),
+    (
+        "dynamics::balance_recoil::Linearisation::force_readout_vjp",
+        "dynamics::integrator::readout::force_vjp",
     ),
     // Pieces of the integrators.
     (

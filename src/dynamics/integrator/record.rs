@@ -224,7 +224,7 @@ impl<'a> LinearisedStep<'_, 'a> {
         self.record
     }
 
-    /// Transpose of [`Stepper::step`]: cotangents of the state (in q and y), of v, of the control
+    /// Transpose of [`Stepper::step`]: cotangents of the state (in q and y), of the velocity v read out there as far as it isn't carried on to the state already, of the control
     /// and of the parameters, from that of the next state.
     ///
     /// # Errors

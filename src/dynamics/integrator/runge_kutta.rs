@@ -224,7 +224,8 @@ impl<'a> StepDerivatives<'a> for Adjoint<'a> {
                 drift.carry_back(-stage.after, force_bar[i].clone()),
                 &start.input.control,
             );
-            if stage.read_out {
+            // Where products couple many bodies the velocity read out at the state is carried on with the force at it.
+            if stage.read_out && e.scattered().is_none() {
                 let force = e.force_vjp(&stage.v, control, &z)?;
                 own.add(1.0, &force);
                 bar.v += v_bar + &force.v;

@@ -242,10 +242,6 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::acceleration::Linearisation::inertial_force_vjp",
     ),
     (
-        "dynamics::balance::Linearisation::dry_vjps",
-        "dynamics::balance::Linearisation::force_vjp",
-    ),
-    (
         "dynamics::balance_recoil::Linearisation::force_readout_vjp",
         "dynamics::integrator::readout::force_vjp",
     ),

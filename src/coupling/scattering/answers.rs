@@ -4,6 +4,7 @@
 //! differs from a known one by known steps.
 
 use super::blocks::dot;
+use super::kept::{Answer, Kept};
 use super::levels::Levels;
 use super::scattered::Scattered;
 use crate::coupling::CouplingReport;
@@ -16,8 +17,6 @@ use std::sync::{Arc, MutexGuard, PoisonError};
 
 const ITERATIONS: usize = 300;
 const RESTART: usize = 60;
-/// Answers kept: those to the velocity, to a virtual one and to what is driven, at both ends of a pair, and a few steps from one velocity to the next.
-const KEPT: usize = 10;
 /// Part of a twist that must be left of it beside others for it to be another direction.
 const APART: f64 = 1e-6;
 /// Of no motion, how near a sum of answers has to be to be a first guess.
@@ -26,20 +25,6 @@ const NEARER: f64 = 0.5;
 const ASKED: f64 = 0.3;
 /// Coarsest relative residual of a solve whose absolute one is asked for.
 const COARSE: f64 = 1e-2;
-
-/// What all bodies are in the water as they move.
-#[derive(Clone, Debug)]
-pub struct Answer {
-    /// Body-frame twists, 6 a body.
-    pub twists: DVector<f64>,
-    /// α, all points.
-    pub charges: Vec<f64>,
-    /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
-    pub exchanged: DVector<f64>,
-    modes: Vec<f64>,
-    /// a − Lᵀ Ĝ α of the modes.
-    left: Vec<f64>,
-}
 
 /// What [`Scattered::recoil`] finds.
 #[derive(Clone, Debug)]
@@ -71,14 +56,6 @@ pub enum Goal {
     Relative(f64),
     /// So much, but no finer than [`Goal::Full`].
     Absolute(f64),
-}
-
-/// What is known at some poses.
-#[derive(Default)]
-pub(super) struct Kept {
-    answers: Vec<Arc<Answer>>,
-    report: CouplingReport,
-    failed: Option<(usize, f64)>,
 }
 
 /// A sum of answers.
@@ -278,11 +255,7 @@ impl Scattered<'_> {
 
     fn keep(&self, answer: Answer) -> Arc<Answer> {
         let answer = Arc::new(answer);
-        let mut kept = self.kept();
-        if kept.answers.len() >= KEPT {
-            kept.answers.remove(0);
-        }
-        kept.answers.push(answer.clone());
+        self.kept().keep(answer.clone());
         answer
     }
 

@@ -1,7 +1,8 @@
 //! Derivatives of the energy of many bodies: of directions that are given by coefficients or by twists.
 
 use super::Scattering;
-use super::answers::{Answer, Recoiled};
+use super::answers::Recoiled;
+use super::kept::Answer;
 use super::places::Places;
 use super::scattered::{Motions, Scattered, mixed, plus};
 use crate::adjoint::lie::{Pose, Vec6};

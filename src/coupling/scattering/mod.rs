@@ -24,6 +24,7 @@ mod answers;
 mod blocks;
 mod cells;
 mod far;
+mod kept;
 mod levels;
 mod linearised;
 mod mirrors;
@@ -34,7 +35,8 @@ mod places;
 mod scattered;
 mod sums;
 
-pub use answers::{Answer, Goal, Recoiled};
+pub use answers::{Goal, Recoiled};
+pub use kept::Answer;
 pub use levels::{Apart, Levels};
 pub use linearised::{Displaced, ScatteredLinearised};
 pub use scattered::{Motions, Scattered};

@@ -1,8 +1,8 @@
 //! Many bodies at some poses: what their modes and twists see of each other, and what they answer.
 
 use super::Scattering;
-use super::answers::{Answer, Kept};
 use super::blocks::{Blocks, dot};
+use super::kept::{Answer, Kept};
 use super::pairs::{Near, Pairs};
 use super::parts::of_each;
 use super::places::{Places, length, minus};

@@ -5,7 +5,7 @@ use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::boundary::ExactBoundary;
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, compress};
-use hydrograd::coupling::scattering::{Levels, Scattering};
+use hydrograd::coupling::scattering::{Goal, Levels, Motions, Scattering};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;
 use hydrograd::geometry::Image;
@@ -138,6 +138,79 @@ fn products_meet_the_factor_to_the_accuracy_asked_for() {
         assert!(worst < 0.5 * accuracy, "accuracy {accuracy}: {worst:e}");
         assert!(worst > 1e-12, "nothing was left out at all");
     }
+}
+
+/// Bodies whose coefficients are their twists.
+struct Free;
+
+impl Motions for Free {
+    fn twists(&self, coefficients: &DVector<f64>) -> DVector<f64> {
+        coefficients.clone()
+    }
+
+    fn transposed(&self, impulses: &DVector<f64>) -> DVector<f64> {
+        impulses.clone()
+    }
+}
+
+#[test]
+fn what_is_known_changes_no_answer_and_coarse_solves_add_up() {
+    let kinds = kinds(0.01);
+    let mut drawn = Samples::new(23);
+    let poses = grid(&mut drawn, 27, 0.2);
+    let (_, many) = both(&kinds, &poses, 0.01);
+    let mut random = || DVector::from_fn(6 * 27, |_, _| 0.5 * drawn.number());
+    let [x, y, z] = [random(), random(), random()];
+    let alone = |twists: &DVector<f64>| {
+        let at = many.place(&poses, Box::new(Free)).unwrap();
+        let found = at.respond(twists);
+        at.check().unwrap();
+        (found.exchanged.clone(), found.charges.clone())
+    };
+    let at = many.place(&poses, Box::new(Free)).unwrap();
+    at.respond(&x);
+    at.respond(&y);
+    let whole = at.report().iterations;
+    // In their span, near it, and far from it.
+    for (near, part) in [(true, 0.0), (true, 1e-12), (true, 1e-4), (false, 1.0)] {
+        let twists = 0.3 * &x - 7.0 * &y + part * &z;
+        let (found, right) = (at.respond(&twists), alone(&twists));
+        let error = (&found.exchanged - &right.0).norm() / right.0.norm();
+        let pairs = found.charges.iter().zip(&right.1);
+        let charges = pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        let charges = charges / right.1.iter().map(|a| a * a).sum::<f64>().sqrt();
+        println!("{near} {part:e}: impulses {error:.1e}, charges {charges:.1e}");
+        assert!(error < 1e-9 && charges < 1e-9);
+    }
+    at.check().unwrap();
+    assert!(at.report().iterations <= whole + 1);
+
+    // Bodies of the water's density that are given momenta.
+    let own = many.own().to_vec();
+    let inertia = |i: usize| 1.0 + own[i / 6][(i % 6, i % 6)];
+    let scale = DVector::from_fn(6 * 27, |i, _| inertia(i).sqrt());
+    let recoil = |h: &DVector<f64>| DVector::from_fn(h.len(), |i, _| h[i] / inertia(i));
+    let solve = |first: &DVector<f64>, behind: Option<&[f64]>, goal: Goal| {
+        let found = at.recoil(first, behind, &scale, recoil, goal);
+        (first - recoil(&found.exchanged), found.left)
+    };
+    let (right, _) = solve(&x, None, Goal::Full);
+    let (mut sum, mut left) = solve(&x, None, Goal::Relative(1e-2));
+    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let first = norm(&left);
+    let none = DVector::zeros(6 * 27);
+    for _ in 0..5 {
+        let (more, after) = solve(&none, Some(&left), Goal::Relative(1e-2));
+        sum += more;
+        left = after;
+    }
+    let error = (&sum - &right).norm() / right.norm();
+    println!(
+        "six coarse solves: {error:.1e}, {:.1e} left of {first:.1e}",
+        norm(&left)
+    );
+    assert!(norm(&left) < 1e-8 * first && error < 1e-9);
+    at.check().unwrap();
 }
 
 #[test]

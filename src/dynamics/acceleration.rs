@@ -131,7 +131,7 @@ impl Linearisation<'_> {
     ) -> Result<Slopes> {
         let row = |i: &usize| self.inertial_force_vjp(v, control, &unit(v.len(), *i));
         // What answers are known when another is asked for is the same for any number of threads.
-        let rows = match self.scattered() {
+        let rows = match self.system.coupling.scattering() {
             Some(_) => entries.iter().map(row).collect::<Result<_>>()?,
             None => in_order(entries.par_iter().map(row))?,
         };

@@ -17,7 +17,7 @@ use nalgebra::DVector;
 
 impl Linearisation<'_> {
     /// Of a velocity v that is read out from momenta, and has the cotangent `v_bar` beside what `ẑᵀ f(q, v, u)` makes of it: w with M w = v̄ + (∂f/∂v)ᵀ ẑ on the rows
-    /// `free`, and the gradient of `ẑᵀ f − wᵀ (M v + p_rest)` over q, u and the parameters, v held. None where a matrix couples bodies, or none is: that is
+    /// `free`, and the gradient of `ẑᵀ f − wᵀ (M v + p_rest)` over q, u and the parameters, v held. None where the mass matrix is formed, or bodies don't feel each other: then it is
     /// [`Linearisation::force_vjp`], a solve and [`Linearisation::momentum_vjp`].
     ///
     /// # Errors

@@ -15,7 +15,7 @@ pub(super) struct Told {
     pub momentum: Vec6,
     /// D'.
     pub carried: Vec6,
-    /// What its momentum changes by as bodies are displaced and move with D' besides, body frame.
+    /// What its momentum changes by as bodies are displaced and change their twists at given rates, D' or what a readout makes of it, body frame.
     pub impulse: Vec6,
     /// By what half the slope of the energy changes so.
     pub wrench: Vec6,

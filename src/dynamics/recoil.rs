@@ -112,7 +112,7 @@ impl<'a> Recoiling<'a> {
     }
 
     /// w with M w = `right` + ρ Jᵀ h on the free rows, h the rates of the bodies' impulses in the water as they move with the velocity of the coefficients `direction`, are displaced along
-    /// `z` and change their twists (body frames) at the rates `twists` − J w; and what the water is then asked for, as [`Linearised::carried`] tells it for those rates.
+    /// `z` and change their twists (body frames) at the rates `twists`; and what [`Linearised::carried`] tells of the rates `twists` − J w.
     ///
     /// [`Linearised::carried`]: crate::coupling::Linearised::carried
     pub(super) fn carried(

@@ -248,7 +248,7 @@ impl<'a> ControlledStep<'_, 'a> {
         run().map_err(|e: Error| e.at_time(self.trajectory.stepper.time(record.state())))
     }
 
-    /// Transpose of the step and its controller; the cotangent of the velocity isn't carried on yet.
+    /// Transpose of the step and its controller; what there is of the velocity's cotangent isn't carried on yet.
     fn transpose(&self, next_bar: &StateBar) -> Result<(StepBar, Vec<f64>)> {
         let (t, record) = (self.trajectory, self.step.record());
         let mut bar = self.step.vjp(next_bar)?;

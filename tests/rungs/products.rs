@@ -4,8 +4,8 @@
 use super::multibody::tree_displacement;
 use super::tools::{Group, all, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
-use hydrograd::dynamics::{Input, Integrator, Parameters, State, StateBar, Stepper};
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Scene, Shape};
+use hydrograd::dynamics::{Drive, Input, Integrator, Parameters, State, StateBar, Stepper};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Motion, Passive, Scene, Shape};
 use hydrograd::simulate::Exchange;
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
@@ -30,7 +30,7 @@ pub fn rungs() -> Vec<Rung> {
     }]
 }
 
-/// A vehicle with an arm, and two others, in a current.
+/// A vehicle with an arm that holds a weight, which isn't in the water, and a tail that is driven, and two others, in a current.
 fn simulator() -> &'static Simulator {
     static MADE: OnceLock<Simulator> = OnceLock::new();
     MADE.get_or_init(|| {
@@ -76,6 +76,39 @@ fn simulator() -> &'static Simulator {
                 .density(2000.0)
                 .at([-0.1, -0.5, 0.2]),
         );
+        scene.add(
+            Body::new(oval(0.06, 0.05, 0.08))
+                .named("tail")
+                .child_of("hull")
+                .density(1000.0)
+                .at([-0.5, 0.0, 0.0])
+                .joint(Joint::Revolute {
+                    axis: [0.1, 0.2, 0.9],
+                })
+                .driven([Motion::Sine {
+                    amplitude: 0.3,
+                    frequency: 1.5,
+                    phase: 0.2,
+                    offset: 0.0,
+                }]),
+        );
+        scene.add(
+            Body::dry()
+                .named("weight")
+                .child_of("arm")
+                .mass(0.8)
+                .inertia([2e-3, 3e-3, 4e-3])
+                .at([0.1, 0.0, 0.1])
+                .joint(Joint::Prismatic {
+                    axis: [0.2, 0.1, 1.0],
+                })
+                .passive(Passive {
+                    stiffness: 4.0,
+                    damping: 0.8,
+                    armature: 0.3,
+                    ..Passive::default()
+                }),
+        );
         let settings = Settings::default()
             .fidelity(Fidelity::Reduced)
             .exchange(Exchange::Products)
@@ -108,7 +141,8 @@ fn step(integrator: Integrator, c: f64) -> Outcome {
     let system = simulator().system();
     let (tree, n) = (&system.tree, system.tree.velocities());
     let own = simulator().parameters();
-    let q = tree.integrate(simulator().start().0, &wavy(n, 0.3, 0.05));
+    let mut q = tree.integrate(simulator().start().0, &wavy(n, 0.3, 0.05));
+    stepper(own, integrator).place_motions(&mut q, 0.0);
     let v = wavy(n, 0.8, 0.5);
     let e = system.linearise(own, &q, 0.0).unwrap();
     let from = From {
@@ -146,7 +180,13 @@ fn step(integrator: Integrator, c: f64) -> Outcome {
     };
     let made = stepper(own, integrator).linearise_step(&base.1);
     let bar = made.and_then(|made| made.state_vjp(&next_bar)).unwrap();
-    let (dq, dy) = (wavy(n, 2.1, 0.05), wavy(n, 3.1, 0.2));
+    let (mut dq, dy) = (wavy(n, 2.1, 0.05), wavy(n, 3.1, 0.2));
+    // A step takes the coordinates of driven joints from their motions.
+    for (link, drive) in tree.links().iter().zip(&system.drives) {
+        if matches!(drive, Drive::Motion(_)) {
+            link.v.clone().for_each(|i| dq[i] = 0.0);
+        }
+    }
     let du = wavy(system.controls, 4.1, 1.0);
     let values = DVector::from_vec(own.to_vec());
     let change = values.map(|x| 0.1 * x);

@@ -17,8 +17,10 @@ use std::sync::{Arc, MutexGuard, PoisonError};
 
 const ITERATIONS: usize = 300;
 const RESTART: usize = 60;
+/// Of a body's largest added mass what any motion of it counts at least.
+const LEAST: f64 = 1e-6;
 /// Part of a twist that must be left of it beside others for it to be another direction.
-const APART: f64 = 1e-6;
+const APART: f64 = 1e-3;
 /// Of no motion, how near a sum of answers has to be to be a first guess.
 const NEARER: f64 = 0.5;
 /// Of the size of modes the least that what they answer has.
@@ -54,7 +56,7 @@ pub enum Goal {
     Full,
     /// Relative to what the solve starts from.
     Relative(f64),
-    /// So much, but no finer than [`Goal::Full`].
+    /// So much, but relative to what the solve starts from no finer than [`Goal::Full`], and no coarser than a hundredth.
     Absolute(f64),
 }
 
@@ -70,7 +72,7 @@ impl Scattered<'_> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What solves cost so far, and the largest residual, relative to what was asked of it.
+    /// What solves cost so far, and the largest residual, of those to a coarser goal as if they had gone on to the levels' as well as to theirs.
     pub fn report(&self) -> CouplingReport {
         self.kept().report.clone()
     }
@@ -123,7 +125,7 @@ impl Scattered<'_> {
     fn relative(&self, goal: f64, right: &[f64]) -> f64 {
         let (size, full) = (norm(right), self.model.levels.tolerance);
         match size > 0.0 {
-            true => (goal / size).clamp(full, COARSE),
+            true => (goal / size).min(COARSE).max(full),
             false => full,
         }
     }
@@ -161,11 +163,19 @@ impl Scattered<'_> {
         self.weighed(twists).norm()
     }
 
+    /// What moves hardly any water, such as a ball's spin, counts a little.
     fn weighed(&self, twists: &DVector<f64>) -> DVector<f64> {
-        let own = self.model.own();
-        DVector::from_fn(twists.len(), |i, _| {
-            own[i / 6][(i % 6, i % 6)].max(0.0).sqrt() * twists[i]
-        })
+        let (own, sizes) = (self.model.own(), &self.model.sizes);
+        let mut out = twists.clone();
+        for (b, twist) in out.as_mut_slice().chunks_exact_mut(6).enumerate() {
+            let diagonal = own[b].diagonal();
+            let most = diagonal.rows(3, 3).max().max(diagonal.rows(0, 3).max());
+            for (i, x) in twist.iter_mut().enumerate() {
+                let least = LEAST * most * if i < 3 { 1.0 } else { sizes[b] * sizes[b] };
+                *x *= diagonal[i].max(least).sqrt();
+            }
+        }
+        out
     }
 
     /// The sum of known answers that is nearest to these twists; none where it is no nearer than no motion.
@@ -174,7 +184,7 @@ impl Scattered<'_> {
         // Orthonormal sums of theirs, each with its coefficients.
         let mut basis: Vec<[DVector<f64>; 2]> = Vec::new();
         for (k, answer) in known.iter().enumerate() {
-            let mut direction = self.weighed(&answer.twists);
+            let mut direction = self.weighed(&answer.solved);
             let size = direction.norm();
             let mut sum = DVector::zeros(known.len());
             sum[k] = 1.0;
@@ -202,18 +212,18 @@ impl Scattered<'_> {
             left: vec![0.0; self.model.mode_count()],
         };
         for (answer, weight) in known.iter().zip(sum.iter()).filter(|(_, w)| **w != 0.0) {
-            out.twists.axpy(*weight, &answer.twists, 1.0);
+            out.twists.axpy(*weight, &answer.solved, 1.0);
             add(*weight, &answer.modes, &mut out.modes);
             add(*weight, &answer.left, &mut out.left);
         }
         let nearer = self.size(&(twists - &out.twists)) <= NEARER * wanted.norm();
-        nearer.then_some(out)
+        (!known.is_empty() && nearer).then_some(out)
     }
 
     /// The answer to body-frame twists.
     pub fn respond(&self, twists: &DVector<f64>) -> Arc<Answer> {
-        if let Some(known) = self.kept().answers.iter().find(|a| a.twists == *twists) {
-            return known.clone();
+        if let Some(known) = self.kept().found(twists) {
+            return known;
         }
         let none = vec![0.0; self.model.mode_count()];
         if twists.iter().all(|x| *x == 0.0) {
@@ -221,6 +231,7 @@ impl Scattered<'_> {
                 charges: vec![0.0; self.model.point_count()],
                 exchanged: twists.clone(),
                 twists: twists.clone(),
+                solved: twists.clone(),
                 left: none.clone(),
                 modes: none,
             });
@@ -248,6 +259,7 @@ impl Scattered<'_> {
             exchanged,
             charges: self.charges(twists, &modes),
             twists: twists.clone(),
+            solved: twists.clone(),
             modes,
             left,
         })
@@ -260,8 +272,8 @@ impl Scattered<'_> {
     }
 
     /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),
-    /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side, to which `behind` is added if there is any:
-    /// what was left of an earlier one.
+    /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side, to which `behind` is added if there is any,
+    /// of the modes or of modes and twists, in the units of [`Recoiled::left`]: what was left of an earlier one, or what else the modes see.
     pub fn recoil(
         &self,
         first: &DVector<f64>,
@@ -318,6 +330,7 @@ impl Scattered<'_> {
             charges: self.charges(&twists, &recoiled.modes),
             exchanged: recoiled.exchanged,
             twists,
+            solved: recoiled.twists,
             modes: recoiled.modes,
             left: recoiled.lacked,
         })

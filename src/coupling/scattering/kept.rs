@@ -16,6 +16,8 @@ pub struct Answer {
     pub charges: Vec<f64>,
     /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
     pub exchanged: DVector<f64>,
+    /// The twists that modes and charges were solved for: the same but for what a solve leaves open.
+    pub(super) solved: DVector<f64>,
     pub(super) modes: Vec<f64>,
     /// a − Lᵀ Ĝ α of the modes.
     pub(super) left: Vec<f64>,
@@ -31,6 +33,14 @@ pub(super) struct Kept {
 }
 
 impl Kept {
+    /// The answer to these twists, if it is kept: the last to make room.
+    pub fn found(&mut self, twists: &DVector<f64>) -> Option<Arc<Answer>> {
+        let place = self.answers.iter().position(|a| a.twists == *twists)?;
+        let found = self.answers.remove(place);
+        self.answers.push(found.clone());
+        Some(found)
+    }
+
     /// Keeps an answer, the oldest of many making room.
     pub fn keep(&mut self, answer: Arc<Answer>) {
         if self.answers.len() >= KEPT {

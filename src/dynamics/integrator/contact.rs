@@ -24,7 +24,7 @@ use std::iter::repeat;
 
 /// Most Newton iterations.
 const ITERATIONS: usize = 200;
-/// Imbalance, relative to what is balanced, below which the search ends once it stops shrinking.
+/// Imbalance, relative to what is balanced, below which the search ends once it stops shrinking; at once where a step is as fine as it is asked to be.
 const RESIDUAL: f64 = 1e-12;
 /// What is accepted at the last iteration.
 const ENOUGH: f64 = 1e-9;
@@ -45,6 +45,8 @@ struct Trial {
     /// What the water's own equations lack of that where M v is a solve of theirs, in units of about the root of an energy; else nothing.
     behind: Vec<f64>,
     imbalance: DVector<f64>,
+    /// Whether more than of the balance itself.
+    lacks: bool,
     residual: f64,
 }
 
@@ -79,13 +81,15 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
             behind.iter().map(|x| x * x).sum::<f64>().sqrt(),
             in_water.get(),
         );
-        let residual = share(sized(&imbalance), size).max(lacking);
+        let own = share(sized(&imbalance), size);
+        let lacks = lacking > own;
         Trial {
             v,
             moved,
             behind,
             imbalance,
-            residual,
+            lacks,
+            residual: if lacks { lacking } else { own },
         }
     };
     let mut now = at(before.clone(), None, Vec::new());
@@ -109,9 +113,10 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>
         let goal = forced.max(FINE * RESIDUAL / now.residual).min(COARSE);
         previous = now.residual;
         let hessian = Hessian::new(e, split, &now.v, dt, &mut places)?;
-        in_water.set(hessian.size(before));
         let (step, left) = hessian.step(&split.take(&now.imbalance), &now.behind, goal);
         let v = split.put(&step);
+        let sizes = [before, &(&now.v - &v)].map(|v| hessian.size(v));
+        in_water.set(sizes.into_iter().fold(in_water.get(), f64::max));
         // Where a product with M is a solve it follows from that of the step, (M − Δt ∂g/∂v) s being the imbalance.
         let moved = by_products.then(|| &now.imbalance + dt * e.contact_force_jvp(&now.v, &v));
         now = search(now, &Step { v, moved, left }, &at);
@@ -145,7 +150,8 @@ fn search(
     let start = slope(&now);
     let mut best = after(1.0);
     let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
-    if high.1 >= -LEFT * start || start.is_nan() || start <= 0.0 {
+    // Where more is left of the water's equations than of the balance, the slope tells nothing.
+    if now.lacks || high.1 >= -LEFT * start || start.is_nan() || start <= 0.0 {
         return best;
     }
     for trial in 0..TRIALS {

@@ -259,7 +259,7 @@ impl<'a> Closure<'a> {
         };
         let free = &start.split.free;
         // What answers are known when another is asked for is the same for any number of threads.
-        let rows: Vec<_> = match start.e.scattered() {
+        let rows: Vec<_> = match start.e.system.coupling.scattering() {
             Some(_) => free.iter().map(row).collect::<Result<_>>()?,
             None => in_order(free.par_iter().map(row))?,
         };

@@ -202,7 +202,7 @@ impl<'a> Stepper<'a> {
 pub struct StepBar {
     /// Of the state.
     pub state: StateBar,
-    /// Of the velocity read out at the state.
+    /// Of the velocity read out at the state, as far as it isn't carried on to that.
     pub v: DVector<f64>,
     /// Of the control.
     pub control: DVector<f64>,

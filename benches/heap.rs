@@ -11,7 +11,10 @@ use common::support::heap::{Heap, heap};
 use hydrograd::dynamics::Integrator;
 use hydrograd::simulate::Exchange;
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// How often a run tells how far it has come.
+const TELL: Duration = Duration::from_secs(30);
 
 /// What is run.
 #[derive(Clone, Copy)]
@@ -40,8 +43,18 @@ impl Case {
         let simulator = Simulator::new(&heap(self.bodies, self.step), settings)?;
         let prepared = start.elapsed().as_secs_f64();
         let steps = (self.seconds / self.step).round() as usize;
+        let controls = Controls::zeros(&simulator, steps);
         let start = Instant::now();
-        let rollout = simulator.rollout(&Controls::zeros(&simulator, steps))?;
+        let mut told = Duration::ZERO;
+        // A run of many minutes that is cut off has told how far it came.
+        let rollout = simulator.rollout_with(&controls, |done| {
+            let passed = start.elapsed();
+            if passed - told >= TELL {
+                told = passed;
+                let each = 1e3 * passed.as_secs_f64() / done as f64;
+                eprintln!("{done} of {steps} steps, {each:.0} ms each so far");
+            }
+        })?;
         let each = start.elapsed().as_secs_f64() / steps as f64;
         Ok((rollout, prepared, each))
     }

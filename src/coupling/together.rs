@@ -1,25 +1,26 @@
 //! Equal scenes whose couplings are computed together.
 
 use super::Coupling;
+use crate::Result;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Seats for equal scenes that are simulated side by side, each on a thread of its own: what all of them ask for at one time is computed at once.
+/// Seats for equal scenes that are simulated side by side, each on a stack of its own: what all of them ask for at one time is computed at once.
 ///
-/// A question waits until every seat that is taken has asked one, so that a seat must be left ([`Together::leave`]) once nobody asks any more. What is
-/// answered doesn't depend on who sits beside, to the last bit.
+/// A question waits until every seat that is taken has asked one. What is answered doesn't depend on who sits beside, to the last bit.
 pub trait Together: Send + Sync {
     /// How many seats there are.
     fn seats(&self) -> usize;
 
-    /// The coupling of all of them: it asks from the seat that its thread sits at, and answers by itself where that has none.
+    /// The coupling of all of them: it asks from the seat of the member that runs on its thread, and answers by itself where none does.
     fn coupling(&self) -> Arc<dyn Coupling>;
 
-    /// This thread sits down. Every seat counts as taken from the start on, whether or not somebody has sat down yet.
-    fn sit(&self, seat: usize);
-
-    /// Nobody asks from this seat any more; called by whoever sits there.
-    fn leave(&self, seat: usize);
+    /// Calls `member` for each seat, all side by side, and returns when all are done. Seats for which there is no thread or memory are left out. A member
+    /// may be halted wherever it asks, so that it must hold no lock there that another needs.
+    ///
+    /// # Errors
+    /// Threads that can't be started.
+    fn side_by_side(&self, member: &(dyn Fn(usize) + Sync)) -> Result<()>;
 
     /// What was done so far.
     fn report(&self) -> TogetherReport;

@@ -10,13 +10,7 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
-
-/// Stack of a member's thread, bytes.
-const STACK: usize = 4 << 20;
-
-/// How often a thread of the pool looks whether others are done while it does the pool's work.
-const LOOK: Duration = Duration::from_micros(200);
+use std::time::Instant;
 
 /// Where a member of a batch begins.
 #[derive(Clone, Debug)]
@@ -46,29 +40,17 @@ pub struct Member {
 pub struct BatchReport {
     /// Seconds in all.
     pub seconds: f64,
-    /// Members that ran side by side, each on its own thread, where their couplings were computed together; 0 where each was computed by itself.
+    /// Members that ran side by side, each on a stack of its own, where their couplings were computed together; 0 where each was computed by itself.
     pub seats: usize,
     /// What was computed together.
     pub together: TogetherReport,
-}
-
-/// Leaves a seat, whatever happens to whom sits there.
-struct Seated<'a> {
-    table: &'a dyn Together,
-    seat: usize,
-}
-
-impl Drop for Seated<'_> {
-    fn drop(&mut self) {
-        self.table.leave(self.seat);
-    }
 }
 
 impl Simulator {
     /// Rollouts of many members, in their order: those of [`Simulator::rollout_as_far`]. `progress` is called after each step of any of them, and ends the
     /// batch where it breaks.
     ///
-    /// With the backend gpu and the fidelity reduced their couplings are computed together, as many as there are threads for ([`BatchReport`]); what a member
+    /// With the backend gpu and the fidelity reduced their couplings are computed together, as many as there is memory for ([`BatchReport`]); what a member
     /// becomes doesn't depend on the others, to the last bit. Everywhere else they are the rollouts by themselves, to the last bit.
     ///
     /// # Errors
@@ -203,12 +185,9 @@ fn seated<T: Send>(
 ) -> Result<Vec<T>> {
     let found: Vec<Mutex<Option<T>>> = (0..members).map(|_| Mutex::default()).collect();
     let next = AtomicUsize::new(0);
-    let left = AtomicUsize::new(table.seats());
     // One for all: its meshes and what else is prepared are large.
     let own = simulator.with_coupling(table.coupling());
-    let sit = |seat: usize| {
-        table.sit(seat);
-        let seated = Seated { table, seat };
+    table.side_by_side(&|_| {
         loop {
             let m = next.fetch_add(1, Ordering::Relaxed);
             let Some(place) = found.get(m) else {
@@ -217,45 +196,14 @@ fn seated<T: Send>(
             let made = work(&own, m);
             *place.lock().unwrap_or_else(PoisonError::into_inner) = Some(made);
         }
-        drop(seated);
-    };
-    let started = std::thread::scope(|scope| {
-        let mut failed = None;
-        for seat in 0..table.seats() {
-            let sit = &sit;
-            let left = &left;
-            let made = std::thread::Builder::new()
-                .name(format!("member {seat}"))
-                .stack_size(STACK)
-                .spawn_scoped(scope, move || {
-                    sit(seat);
-                    left.fetch_sub(1, Ordering::Release);
-                });
-            if let Err(error) = made {
-                // Nobody may wait for a seat that stays empty; those that are taken do all the work.
-                table.leave(seat);
-                left.fetch_sub(1, Ordering::Release);
-                failed = Some(error);
-            }
-        }
-        // A thread of the pool must not wait for others that may need the pool.
-        while rayon::current_thread_index().is_some() && left.load(Ordering::Acquire) > 0 {
-            if rayon::yield_now() != Some(rayon::Yield::Executed) {
-                std::thread::sleep(LOOK);
-            }
-        }
-        failed
-    });
+    })?;
     let out: Option<Vec<T>> = found
         .into_iter()
         .map(|place| place.into_inner().unwrap_or_else(PoisonError::into_inner))
         .collect();
     out.ok_or_else(|| Error::Unsupported {
         what: format!("a batch of {members} members"),
-        why: match started {
-            Some(error) => format!("no thread could be started for it: {error}"),
-            None => "a member ended without a result".into(),
-        },
+        why: "no thread or memory could be had for any, or a member ended without a result".into(),
         instead: "use fewer members, or the backend cpu".into(),
     })
 }

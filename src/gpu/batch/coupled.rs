@@ -1,5 +1,6 @@
-//! All seats as one coupling: whoever asks, asks from the seat of the thread.
+//! All seats as one coupling: whoever asks, asks from the seat of the member that runs on the thread.
 
+use super::crew::seat;
 use super::question::Kind;
 use super::seat::Seat;
 use super::solved::SolvedTogether;
@@ -11,18 +12,7 @@ use crate::coupling::{
     Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential,
 };
 use nalgebra::DMatrix;
-use std::cell::Cell;
 use std::sync::Arc;
-
-thread_local! {
-    /// Where this thread sits: threads are a batch's own, and sit at one table at a time.
-    static SEAT: Cell<Option<usize>> = const { Cell::new(None) };
-}
-
-/// This thread sits there now.
-pub(super) fn sit(seat: Option<usize>) {
-    SEAT.set(seat);
-}
 
 /// The fidelity reduced of many equal scenes.
 pub(super) struct Seats {
@@ -31,9 +21,9 @@ pub(super) struct Seats {
 }
 
 impl Seats {
-    /// The seat of this thread.
+    /// The seat of the member that runs on this thread.
     fn own(&self) -> Option<&Seat> {
-        self.seats.get(SEAT.get()?)
+        self.seats.get(seat()?)
     }
 }
 

@@ -53,7 +53,7 @@ impl Group {
     /// Answers for some seats' questions.
     fn work(&self, asked: Vec<Vec<Question>>) -> std::result::Result<Vec<Vec<Answer>>, String> {
         let counts: Vec<usize> = asked.iter().map(Vec::len).collect();
-        let all = asked.concat();
+        let all: Vec<Question> = asked.into_iter().flatten().collect();
         self.meetings.fetch_add(1, Ordering::Relaxed);
         self.questions
             .fetch_add(all.len() as u64, Ordering::Relaxed);
@@ -63,18 +63,23 @@ impl Group {
         Ok(parts.collect())
     }
 
+    /// Answers all seats of this group until they are left.
+    pub fn serve(&self) {
+        self.meeting.serve(|asked| self.work(asked));
+    }
+
     /// Asks from a seat of this group.
     ///
     /// # Errors
     /// A device that fails.
     pub fn ask(&self, seat: usize, questions: Vec<Question>) -> Result<Vec<Answer>> {
-        let answered = self.meeting.ask(seat, questions, |asked| self.work(asked));
+        let answered = self.meeting.ask(seat, questions);
         answered.map_err(|what| self.model.context.failure(what))
     }
 
     /// A seat is left.
     pub fn leave(&self) {
-        self.meeting.leave(|asked| self.work(asked));
+        self.meeting.leave();
     }
 
     /// An evaluation was computed on the CPU.

@@ -1,12 +1,15 @@
-//! Where threads meet: each asks, and the last one to ask answers all.
+//! Where members meet: each asks, and once all have, whoever serves them answers all.
 
+use super::crew::make_way;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Thread;
 
 /// Members ask questions `Q`, and get answers `A`.
 pub(super) struct Meeting<Q, A> {
     state: Mutex<State<Q, A>>,
+    /// Told when all have asked, or nobody is left.
+    complete: Condvar,
 }
 
 struct State<Q, A> {
@@ -26,23 +29,7 @@ struct Asked<Q, A> {
 /// An answer, or why there is none.
 pub(super) type Answered<A> = Result<A, String>;
 
-/// An answer, with who else is to be woken.
-type Cell<A> = Mutex<Option<(Answered<A>, Woken)>>;
-
-/// All who wait, and the place among them of one: waking is shared out, for it takes longer than the answer.
-#[derive(Clone)]
-struct Woken {
-    all: Arc<Vec<Thread>>,
-    place: usize,
-}
-
-impl Woken {
-    /// Wakes the two of whom this one is to take care.
-    fn pass_on(&self) {
-        let first = 2 * self.place + 2;
-        self.all.iter().skip(first).take(2).for_each(Thread::unpark);
-    }
-}
+type Cell<A> = Mutex<Option<Answered<A>>>;
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -54,19 +41,15 @@ impl<Q, A> Meeting<Q, A> {
         let waiting = Vec::with_capacity(present);
         Self {
             state: Mutex::new(State { present, waiting }),
+            complete: Condvar::new(),
         }
     }
 
-    /// Asks, and waits until all who are present have; then `work` answers, in the members' order.
+    /// Asks, and makes way for others of this thread until whoever serves has answered.
     ///
     /// # Errors
-    /// What `work` reports: all get to know it.
-    pub fn ask(
-        &self,
-        member: usize,
-        question: Q,
-        work: impl FnOnce(Vec<Q>) -> Answered<Vec<A>>,
-    ) -> Answered<A> {
+    /// What was reported there: all get to know it.
+    pub fn ask(&self, member: usize, question: Q) -> Answered<A> {
         let cell: Arc<Cell<A>> = Arc::default();
         let asked = Asked {
             member,
@@ -74,55 +57,64 @@ impl<Q, A> Meeting<Q, A> {
             thread: std::thread::current(),
             cell: cell.clone(),
         };
-        let all = {
-            let mut state = locked(&self.state);
-            state.waiting.push(asked);
-            state.complete()
-        };
-        if let Some(all) = all {
-            answer(all, work);
-        }
+        let mut state = locked(&self.state);
+        state.waiting.push(asked);
+        self.tell(&state);
+        drop(state);
+        let mut moved = true;
         loop {
-            // What was parked may wake before its time.
-            if let Some((answer, woken)) = locked(&cell).take() {
-                woken.pass_on();
+            if let Some(answer) = locked(&cell).take() {
                 return answer;
             }
-            std::thread::park();
+            make_way(moved);
+            moved = false;
         }
     }
 
     /// A member goes; those who waited for nobody else are answered.
-    pub fn leave(&self, work: impl FnOnce(Vec<Q>) -> Answered<Vec<A>>) {
-        let all = {
+    pub fn leave(&self) {
+        let mut state = locked(&self.state);
+        state.present = state.present.saturating_sub(1);
+        self.tell(&state);
+    }
+
+    fn tell(&self, state: &State<Q, A>) {
+        if state.waiting.len() >= state.present {
+            self.complete.notify_one();
+        }
+    }
+
+    /// Answers all who are present each time that they have asked, in the members' order, until all have left.
+    pub fn serve(&self, mut work: impl FnMut(Vec<Q>) -> Answered<Vec<A>>) {
+        loop {
             let mut state = locked(&self.state);
-            state.present = state.present.saturating_sub(1);
-            state.complete()
-        };
-        if let Some(all) = all {
-            answer(all, work);
+            while state.waiting.len() < state.present {
+                let woken = self.complete.wait(state);
+                state = woken.unwrap_or_else(PoisonError::into_inner);
+            }
+            if state.waiting.is_empty() {
+                return;
+            }
+            let room = Vec::with_capacity(state.present);
+            let all = std::mem::replace(&mut state.waiting, room);
+            drop(state);
+            answer(all, &mut work);
         }
     }
 }
 
-impl<Q, A> State<Q, A> {
-    /// All who wait, if nobody else is to come.
-    fn complete(&mut self) -> Option<Vec<Asked<Q, A>>> {
-        let complete = !self.waiting.is_empty() && self.waiting.len() >= self.present;
-        complete.then(|| std::mem::take(&mut self.waiting))
-    }
-}
-
-fn answer<Q, A>(mut all: Vec<Asked<Q, A>>, work: impl FnOnce(Vec<Q>) -> Answered<Vec<A>>) {
+fn answer<Q, A>(mut all: Vec<Asked<Q, A>>, work: &mut impl FnMut(Vec<Q>) -> Answered<Vec<A>>) {
     all.sort_by_key(|asked| asked.member);
-    let (mut questions, mut threads, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut questions, mut cells) = (Vec::new(), Vec::new());
+    let mut threads: Vec<Thread> = Vec::new();
     for asked in all {
         questions.push(asked.question);
-        threads.push(asked.thread);
         cells.push(asked.cell);
+        if threads.iter().all(|known| known.id() != asked.thread.id()) {
+            threads.push(asked.thread);
+        }
     }
-    let threads = Arc::new(threads);
-    // A panic here would leave the others waiting for ever.
+    // A panic here would leave all waiting for ever.
     let done = catch_unwind(AssertUnwindSafe(|| work(questions)));
     let done =
         done.unwrap_or_else(|_| Err("what was asked of it together ended in a panic".into()));
@@ -131,11 +123,10 @@ fn answer<Q, A>(mut all: Vec<Asked<Q, A>>, work: impl FnOnce(Vec<Q>) -> Answered
         Err(why) => cells.iter().map(|_| Err(why.clone())).collect(),
     };
     answers.resize_with(cells.len(), || Err("an answer is missing".into()));
-    for (place, (cell, answer)) in cells.iter().zip(answers).enumerate() {
-        let all = threads.clone();
-        *locked(cell) = Some((answer, Woken { all, place }));
+    for (cell, answer) in cells.iter().zip(answers) {
+        *locked(cell) = Some(answer);
     }
-    threads.iter().take(2).for_each(Thread::unpark);
+    threads.iter().for_each(Thread::unpark);
 }
 
 #[cfg(test)]
@@ -148,14 +139,15 @@ mod tests {
         let meeting = Meeting::<usize, usize>::new(9);
         let work = |questions: Vec<usize>| Ok(questions.iter().map(|q| q + 1).collect());
         std::thread::scope(|scope| {
+            scope.spawn(|| meeting.serve(work));
             for member in 0..9 {
                 let meeting = &meeting;
                 scope.spawn(move || {
                     for turn in 0..3 * member {
                         let question = 100 * member + turn;
-                        assert_eq!(meeting.ask(member, question, work), Ok(question + 1));
+                        assert_eq!(meeting.ask(member, question), Ok(question + 1));
                     }
-                    meeting.leave(work);
+                    meeting.leave();
                 });
             }
         });
@@ -164,15 +156,23 @@ mod tests {
     #[test]
     fn what_fails_fails_for_all() {
         let meeting = Meeting::<usize, usize>::new(5);
+        let mut turn = 0;
+        let work = |_| {
+            turn += 1;
+            match turn {
+                1 => Err("lost".into()),
+                _ => panic!("on purpose"),
+            }
+        };
         std::thread::scope(|scope| {
+            scope.spawn(|| meeting.serve(work));
             for member in 0..5 {
                 let meeting = &meeting;
                 scope.spawn(move || {
-                    let broken = meeting.ask(member, 0, |_| Err("lost".into()));
-                    assert_eq!(broken, Err("lost".into()));
-                    let panicked = meeting.ask(member, 0, |_| panic!("on purpose"));
+                    assert_eq!(meeting.ask(member, 0), Err("lost".into()));
+                    let panicked = meeting.ask(member, 0);
                     assert!(panicked.is_err_and(|why| why.contains("panic")));
-                    meeting.leave(|_| Ok(Vec::new()));
+                    meeting.leave();
                 });
             }
         });

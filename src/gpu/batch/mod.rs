@@ -5,14 +5,15 @@
 //! small: conjugate gradients in single precision gain five digits, and rounds of residuals in the fine arithmetic refine them.
 //! Points and charges stay on the device in a *slot* of their scene, so that what derivatives ask for sends a few numbers.
 //!
-//! The simulations ask for whatever they need when they need it. Each sits at a seat, on a thread of its own; once all of a group have
-//! asked, one of them takes the questions to the device. Two groups take turns, so that one computes on the host while the other waits.
+//! The simulations ask for whatever they need when they need it. Each sits at a seat, on a stack of its own, and makes way for others of its thread while it waits; once all of
+//! a group have asked, the group's server takes the questions to the device. Two groups take turns, so that one computes on the host while the other waits.
 //! An answer depends on its question alone: not on who else is there, nor on their order.
 //!
 //! Where a gap has a film, a system isn't solved on the device, or two directions that aren't on the basis are asked for, the CPU answers that question.
 
 mod count;
 mod coupled;
+mod crew;
 mod group;
 mod meeting;
 mod model;
@@ -24,10 +25,10 @@ mod solved;
 pub use count::{Cost, forward, with_gradient};
 
 use super::context::Context;
-use crate::Result;
 use crate::coupling::reduced::Reduced;
 use crate::coupling::{Coupling, Together, TogetherReport};
-use coupled::{Seats, sit};
+use crate::{Error, Result};
+use coupled::Seats;
 use group::{Group, SLOTS};
 use model::Model;
 use seat::Seat;
@@ -35,7 +36,7 @@ use std::sync::Arc;
 
 /// Most columns of a basis.
 const COLUMNS: usize = 12;
-/// Most threads that wait for one device.
+/// Most members that wait for one device.
 const SEATS: usize = 2048;
 /// From how many scenes on they are parted into two groups.
 const PARTED: usize = 64;
@@ -47,7 +48,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Seats for up to `scenes` scenes whose basis has `columns` columns: fewer where the device's buffers don't take so many, or more threads than pays.
+    /// Seats for up to `scenes` scenes whose basis has `columns` columns: fewer where the device's buffers don't take so many, or more members than pays.
     /// `None` where such scenes are computed one by one: without columns or with more than twelve, and where pairs of bodies fade out.
     ///
     /// # Errors
@@ -97,6 +98,15 @@ impl Batch {
     }
 }
 
+/// Leaves a seat, whatever happens to whom sits there.
+struct Leaves<'a>(&'a (dyn Fn(usize) + Sync), usize);
+
+impl Drop for Leaves<'_> {
+    fn drop(&mut self) {
+        (self.0)(self.1);
+    }
+}
+
 impl Together for Batch {
     fn seats(&self) -> usize {
         self.coupled.seats.len()
@@ -106,15 +116,27 @@ impl Together for Batch {
         self.coupled.clone()
     }
 
-    fn sit(&self, seat: usize) {
-        sit(Some(seat));
-    }
-
-    fn leave(&self, seat: usize) {
-        sit(None);
-        if let Some(seat) = self.coupled.seats.get(seat) {
-            seat.group.leave();
-        }
+    fn side_by_side(&self, member: &(dyn Fn(usize) + Sync)) -> Result<()> {
+        let leave = |seat: usize| {
+            if let Some(seat) = self.coupled.seats.get(seat) {
+                seat.group.leave();
+            }
+        };
+        let seated = |seat: usize| {
+            let leaves = Leaves(&leave, seat);
+            member(seat);
+            drop(leaves);
+        };
+        let serve = self.groups.iter().map(|group| || group.serve());
+        let serve: Vec<_> = serve.collect();
+        let servers: Vec<&(dyn Fn() + Sync)> = serve.iter().map(|one| one as _).collect();
+        let seats = self.seats();
+        let lost = crew::side_by_side(seats, &servers, &seated, &leave);
+        lost.map(drop).map_err(|error| Error::Unsupported {
+            what: format!("a batch of {seats} members at a time"),
+            why: format!("no thread could be started for it: {error}"),
+            instead: "use fewer members, or the backend cpu".into(),
+        })
     }
 
     fn report(&self) -> TogetherReport {

@@ -5,7 +5,7 @@
 // Twin: coupling::reduced's ReducedLinearised::new.
 
 //! uses: vector batch batch_rough batch_refine
-//! constants: LANES COLUMNS WIDE PLACE
+//! constants: LANES COLUMNS WIDE QUADS PLACE
 
 const TANGENT: bool = false;
 const DIRECTIONS: u32 = 1u;

@@ -8,7 +8,7 @@
 // Twin: coupling::reduced's second.
 
 //! uses: vector batch batch_rough batch_refine
-//! constants: LANES COLUMNS WIDE
+//! constants: LANES COLUMNS WIDE QUADS
 
 const TANGENT: bool = true;
 // Charges of the combinations, and δG α.

@@ -4,7 +4,7 @@
 // What it leaves: a, α and ψ in `work`.
 
 var<workgroup> tile_charges: array<real, TILE * COLUMNS>;
-var<workgroup> largest: array<f32, WIDE>;
+var<workgroup> largest: array<f32, PADDED>;
 var<workgroup> worst: f32;
 
 fn expand(base: u32, twists: u32, solved: bool, lane: u32) {
@@ -99,16 +99,18 @@ fn project(base: u32, rough_base: u32, first: bool, lane: u32) {
                 sums[k] = add(sums[k], mul(entry, work[begin + k]));
             }
         }
-        for (var k = 0u; k < COLUMNS; k++) {
-            let left = sub(sums[k], work[base + m * COLUMNS + k]);
-            rough[rough_base + m * WIDE + k] = narrow(left);
+        var left: array<vec4<f32>, QUADS>;
+        for (var k = 0u; k < QUADS; k++) {
+            left[k] = vec4<f32>(0.0);
         }
-        if WIDE > COLUMNS {
-            var probe = 0.0;
-            if first {
-                probe = fixed_single[scene.probe + m];
-            }
-            rough[rough_base + m * WIDE + WIDE - 1u] = probe;
+        for (var k = 0u; k < COLUMNS; k++) {
+            left[k / 4u][k % 4u] = narrow(sub(sums[k], work[base + m * COLUMNS + k]));
+        }
+        if WIDE > COLUMNS && first {
+            left[(WIDE - 1u) / 4u][(WIDE - 1u) % 4u] = fixed_single[scene.probe + m];
+        }
+        for (var k = 0u; k < QUADS; k++) {
+            rough[rough_base + m * QUADS + k] = left[k];
         }
     }
 }
@@ -138,7 +140,7 @@ fn refine(question: u32, slot: u32, twists: u32, given: u32, status: u32, lane: 
     for (var e = lane; e < scene.modes * COLUMNS; e += LANES) {
         work[base + e] = num(0.0);
     }
-    if lane < WIDE {
+    if lane < PADDED {
         bent[lane] = 0u;
         largest[lane] = 0.0;
     }
@@ -156,15 +158,15 @@ fn refine(question: u32, slot: u32, twists: u32, given: u32, status: u32, lane: 
         storageBarrier();
         project(base, rough_base, turn == 0u, lane);
         storageBarrier();
-        let count = scene.modes * WIDE;
-        var own = 0.0;
+        let count = scene.modes * QUADS;
+        var own = vec4<f32>(0.0);
         if lane < STRIDE {
             for (var e = lane; e < count; e += STRIDE) {
                 own += rough[rough_base + e] * rough[rough_base + e];
             }
         }
         sum_columns(lane, own);
-        if lane < WIDE {
+        if lane < PADDED {
             let square = totals[lane];
             if turn == 0u {
                 largest[lane] = square;
@@ -175,11 +177,13 @@ fn refine(question: u32, slot: u32, twists: u32, given: u32, status: u32, lane: 
                 if !(square <= scene.end * largest[lane]) {
                     go = 1u;
                 }
-            } else if turn == 0u {
+            } else if turn == 0u && lane < WIDE {
                 go = 1u;
             }
             goes[lane] = go;
             size[lane] = sqrt(square);
+            // What a round divides by.
+            alpha[lane] = select(0.0, 1.0 / size[lane], go != 0u);
         }
         workgroupBarrier();
         if lane == 0u {
@@ -197,19 +201,15 @@ fn refine(question: u32, slot: u32, twists: u32, given: u32, status: u32, lane: 
             break;
         }
         for (var e = lane; e < count; e += LANES) {
-            let k = e % WIDE;
-            var scale = 0.0;
-            if goes[k] != 0u {
-                scale = 1.0 / size[k];
-            }
-            rough[rough_base + e] *= scale;
+            let k = 4u * (e % QUADS);
+            rough[rough_base + e] *= vec4<f32>(alpha[k], alpha[k + 1u], alpha[k + 2u], alpha[k + 3u]);
         }
         storageBarrier();
         workgroupBarrier();
         rough_solve(rough_base, slot, lane, probe, status + 4u);
         for (var e = lane; e < scene.modes * COLUMNS; e += LANES) {
             let k = e % COLUMNS;
-            let y = rough[rough_base + 3u * count + (e / COLUMNS) * WIDE + k];
+            let y = rough[rough_base + 3u * count + (e / COLUMNS) * QUADS + k / 4u][k % 4u];
             work[base + e] = add(work[base + e], mul(num(size[k]), num(y)));
         }
     }

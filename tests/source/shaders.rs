@@ -18,13 +18,24 @@ const SURFACES: [Surface; 2] = [Surface::Faces, Surface::Panels];
 
 /// A setting with as many columns in all as there are, and with one more.
 fn widened(given: &Vec<(&'static str, Constant)>) -> Vec<Vec<(&'static str, Constant)>> {
-    let columns = given.iter().find_map(|(name, value)| match (name, value) {
-        (&"COLUMNS", Constant::Number(n)) => Some(*n),
-        _ => None,
-    });
-    let columns = columns.expect("COLUMNS before WIDE");
+    let columns = number(given, "COLUMNS");
     let with = |n: u32| [&given[..], &[("WIDE", Constant::Number(n))]].concat();
     vec![with(columns), with(columns + 1)]
+}
+
+/// The same constants, and how many fours of columns these are.
+fn in_fours(given: &Vec<(&'static str, Constant)>) -> Vec<(&'static str, Constant)> {
+    let quads = number(given, "WIDE").div_ceil(4);
+    [&given[..], &[("QUADS", Constant::Number(quads))]].concat()
+}
+
+/// A number among constants that come before.
+fn number(given: &[(&'static str, Constant)], wanted: &str) -> u32 {
+    let found = given.iter().find_map(|(name, value)| match value {
+        Constant::Number(n) if *name == wanted => Some(*n),
+        _ => None,
+    });
+    found.unwrap_or_else(|| panic!("{wanted} comes before what depends on it"))
 }
 
 /// Every setting of a shader's constants that differs in kind.
@@ -39,6 +50,10 @@ fn settings(shader: &Shader) -> Vec<Vec<(&'static str, Constant)>> {
             // Columns, with one more beside them or without.
             "WIDE" => {
                 all = all.iter().flat_map(widened).collect();
+                continue;
+            }
+            "QUADS" => {
+                all = all.iter().map(in_fours).collect();
                 continue;
             }
             "LANES" => vec![Constant::Number(64), Constant::Number(256)],

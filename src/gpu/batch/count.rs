@@ -42,7 +42,8 @@ impl std::ops::Add for Cost {
 fn solve(size: &SceneSize, n: f64, probing: bool, rounds: f64, iterations: f64) -> Cost {
     let (pairs, entries) = (size.pairs as f64, size.entries as f64);
     let (points, modes) = (size.points as f64, size.modes as f64);
-    let wide = n + f64::from(u8::from(probing));
+    // Four columns side by side, zeros among them.
+    let wide = 4.0 * ((n + f64::from(u8::from(probing))) / 4.0).ceil();
     // A round forms potentials, and the residual from them; the last one finds that all is solved. Then momenta are read out.
     let round = pairs * (INVERSE + 2.0 * n) + 4.0 * entries * n;
     let iteration = pairs * (ROUGH_INVERSE + 2.0 * wide) + (4.0 * entries + 12.0 * modes) * wide;

@@ -97,7 +97,7 @@ impl Kind {
                 Self::Tangent(n) => work(2 * n, 12),
                 _ => work(1, 3 * (n + 1)),
             },
-            rough: (4 * modes + 2 * points) * wide,
+            rough: (4 * modes + 2 * points) * wide.next_multiple_of(4),
         }
     }
 }
@@ -144,6 +144,7 @@ impl Prepared {
                 ("LANES", number(model.lanes)),
                 ("COLUMNS", number(columns)),
                 ("WIDE", number(wide)),
+                ("QUADS", number(wide.div_ceil(4))),
             ];
             if shader.0 == "batch_solve" {
                 constants.push(("PLACE", Constant::Flag(kind.places())));

@@ -91,13 +91,18 @@ impl MeshTree {
 
     /// Depth of a point inside the surface if it is above `floor` ≥ 0.
     pub fn depth_above(&self, p: &Vec3, floor: f64) -> Option<f64> {
-        if self.nodes[0].distance_squared(p) > 0.0 {
+        if !self.in_box(p) {
             return None;
         }
         let stop = floor * floor;
         let best = self.nearest(p, stop);
         (best.square > stop && best.square.is_finite() && self.inside(p, &best))
             .then(|| best.square.sqrt())
+    }
+
+    /// Whether a point lies in the box around the mesh.
+    pub fn in_box(&self, p: &Vec3) -> bool {
+        self.nodes[0].distance_squared(p) <= 0.0
     }
 
     /// Closest point to `p`; given up once it is nearer than the root of `stop`.

@@ -232,8 +232,7 @@ impl Clearance {
     /// Refuses bodies that lie too far inside one another though they may overlap.
     fn refuse_depth(&self, poses: &[Pose]) -> Result<()> {
         for share in &self.declared {
-            let value = share.at(poses);
-            if value > MOST_SHARED {
+            if let Some(value) = share.above(poses, MOST_SHARED) {
                 let (inner, outer) = share.bodies();
                 let name = |b: usize| format!("body {:?}", self.names[b]);
                 return Err(Error::Unresolved {

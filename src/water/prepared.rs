@@ -241,14 +241,15 @@ fn plan(
         })
     };
     let start = &start;
-    let both = [&clearance.moving, &clearance.rigid].into_iter();
-    let gaps = both.flat_map(|gaps| {
-        gaps.all(all)
-            .into_iter()
-            .filter_map(move |g| start(gaps, g))
-    });
-    let gaps: Vec<StartGap> = gaps.collect();
-    let planned = fidelity.kind().plan(problem, &poses, &gaps)?;
+    let within = |distance: f64| {
+        let both = [&clearance.moving, &clearance.rigid].into_iter();
+        let gaps = both.flat_map(|gaps| {
+            let near = gaps.within(all, distance).into_iter();
+            near.filter_map(move |gap| start(gaps, gap))
+        });
+        gaps.collect::<Vec<StartGap>>()
+    };
+    let planned = fidelity.kind().plan(problem, &poses, &within)?;
     Ok((Fidelity::Reduced, planned))
 }
 

@@ -594,7 +594,13 @@ fn share(a: &TriMesh, b: &TriMesh, shift: [f64; 3]) -> f64 {
         Pose::new(turn, first.translation + turn * Vec3::from(shift)),
     ];
     let either = Share::new(&[Some(a), Some(b)], (0, 1)).unwrap();
-    either.at(&poses)
+    let found = either.at(&poses);
+    // Boxes tell the same.
+    for limit in [-1.0, 0.0, 0.1, 0.5, 0.9] {
+        let above = (found > limit).then_some(found);
+        assert_eq!(either.above(&poses, limit), above, "{found}");
+    }
+    found
 }
 
 #[test]

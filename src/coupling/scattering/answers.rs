@@ -169,7 +169,7 @@ impl Scattered<'_> {
         let mut out = twists.clone();
         for (b, twist) in out.as_mut_slice().chunks_exact_mut(6).enumerate() {
             let diagonal = own[b].diagonal();
-            let most = diagonal.rows(3, 3).max().max(diagonal.rows(0, 3).max());
+            let most = diagonal.rows(0, 3).max();
             for (i, x) in twist.iter_mut().enumerate() {
                 let least = LEAST * most * if i < 3 { 1.0 } else { sizes[b] * sizes[b] };
                 *x *= diagonal[i].max(least).sqrt();

@@ -14,6 +14,8 @@ const STEPS: usize = 12;
 const LEFT: f64 = 0.3;
 /// Residual that is rounding.
 const ROUNDING: f64 = 1e-15;
+/// Residual at which a stage is solved whose evaluations are themselves solves, and leave about as much.
+const SOLVED: f64 = 1e-12;
 
 /// A velocity that a stage may have, with what is left of its equation.
 pub(super) struct Trial {
@@ -56,7 +58,8 @@ pub(super) fn descend(
         let step = -&back;
         let now = at(&v + split.put(&step)).ok()?;
         let stalled = now.residual > 0.5 * previous;
-        if now.converged(previous) || (stalled && now.residual <= noise) {
+        let solved = now.residual <= noise.min(SOLVED);
+        if solved || now.converged(previous) || (stalled && now.residual <= noise) {
             return Some(now);
         }
         let nearer = now.residual <= LEFT * previous;

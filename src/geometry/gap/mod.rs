@@ -357,11 +357,28 @@ impl Share {
     /// hundredths for a hundred faces.
     pub fn at(&self, poses: &[Pose]) -> f64 {
         let (inner, outer) = (&poses[self.inner], &poses[self.outer]);
-        let inside = |x: &Vec3| {
-            let there = outer.apply_inverse(&inner.apply(x));
-            self.tree.depth_above(&there, 0.0).is_some()
-        };
-        let parts = self.samples.iter().filter(|(x, _)| inside(x));
+        let there = |x: &Vec3| outer.apply_inverse(&inner.apply(x));
+        let parts = self.samples.iter().filter(|(x, _)| self.holds(&there(x)));
         parts.map(|(_, part)| part).sum::<f64>() + 0.0
+    }
+
+    /// [`Share::at`], if it is above a limit: most links lie so little in one another that boxes tell.
+    pub fn above(&self, poses: &[Pose], limit: f64) -> Option<f64> {
+        let (inner, outer) = (&poses[self.inner], &poses[self.outer]);
+        let there = |x: &Vec3| outer.apply_inverse(&inner.apply(x));
+        let near = self.samples.iter().map(|(x, part)| (there(x), *part));
+        let near: Vec<(Vec3, f64)> = near.filter(|(x, _)| self.tree.in_box(x)).collect();
+        let most: f64 = near.iter().map(|(_, part)| part.max(0.0)).sum();
+        if most <= limit {
+            return None;
+        }
+        let parts = near.iter().filter(|(x, _)| self.holds(x));
+        let value = parts.map(|(_, part)| part).sum::<f64>() + 0.0;
+        (value > limit).then_some(value)
+    }
+
+    /// Whether a point lies in the larger body, in its frame.
+    fn holds(&self, x: &Vec3) -> bool {
+        self.tree.depth_above(x, 0.0).is_some()
     }
 }

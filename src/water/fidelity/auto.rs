@@ -7,12 +7,12 @@
 //! starts with.
 
 use super::given::LEAST;
-use super::kind::{FidelityKind, Knob, Planned, StartGap};
+use super::kind::{FidelityKind, GapsWithin, Knob, Planned, StartGap};
 use super::reduced::Reduced;
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::boundary::exact::lamb;
 use crate::coupling::reduced::{Cutoff, compress};
-use crate::geometry::{Gap, MassProperties};
+use crate::geometry::{Gap, MassProperties, TriMesh};
 use crate::water::device::Device;
 use crate::water::method::kind::Problem;
 use crate::water::numerics::Numerics;
@@ -57,8 +57,8 @@ impl FidelityKind for Auto {
         true
     }
 
-    fn plan(&self, problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
-        plan(problem, poses, gaps)
+    fn plan(&self, problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planned> {
+        plan(problem, poses, within)
     }
 
     // A fidelity that chooses is in use itself only without water.
@@ -87,7 +87,7 @@ impl FidelityKind for Auto {
 }
 
 /// Chooses for the bodies at the start, for an error of the coupling of the accuracy that is aimed at.
-fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned> {
+fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planned> {
     let (bodies, walls, aim) = (problem.bodies, problem.walls, problem.numerics.accuracy);
     if !(aim > 0.0 && aim < 1.0) {
         return Err(Error::input(
@@ -95,6 +95,15 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             aim,
             "a number between 0 and 1, such as 0.01",
         ));
+    }
+    // Gaps so wide that no body is compressed finer for them aren't looked at.
+    let widest = bodies.iter().filter_map(|body| Some(coarsest(body.mesh?)));
+    let gaps = within(widest.fold(0.0, f64::max) / ROOM_FLAT);
+    let mut near: Vec<Vec<&StartGap>> = bodies.iter().map(|_| Vec::new()).collect();
+    for start in &gaps {
+        for (b, _) in start.gap.sides() {
+            near[b].push(start);
+        }
     }
     let mut out = Planned::default();
     let mut strengths = Vec::with_capacity(bodies.len());
@@ -111,16 +120,14 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
             strength(&properties, body.added_mass.as_ref())?,
             poses[b].apply(&mesh.bounding_ball().center),
         ));
-        let near = || gaps.iter().filter(|start| start.gap.touches(b));
-        let distances = near().map(|start| start.gap.image_distance());
+        let distances = near[b].iter().map(|start| start.gap.image_distance());
         let smallest = distances.fold(f64::INFINITY, f64::min);
-        let room = match near().any(|start| start.film > FLAT) {
+        let room = match near[b].iter().any(|start| start.film > FLAT) {
             true => ROOM_FLAT,
             false => ROOM,
         };
         let finest = compress::finest_gap(mesh.surface_area());
-        let coarsest = COARSEST * compress::default_gap(properties.volume, mesh.surface_area());
-        let gap = (room * smallest).clamp(finest, coarsest);
+        let gap = (room * smallest).clamp(finest, coarsest(mesh));
         // What compression leaves out is worth more the nearer the gap, in the force above all.
         let tolerance = match smallest < CLOSE * finest {
             true => (COMPRESSION * aim).min(compress::CompressSettings::default().tolerance),
@@ -162,6 +169,12 @@ fn plan(problem: &Problem, poses: &[Pose], gaps: &[StartGap]) -> Result<Planned>
         }
     }
     Ok(out)
+}
+
+/// The gap that a body resolves to which nothing is near, m.
+fn coarsest(mesh: &TriMesh) -> f64 {
+    let volume = mesh.mass_properties().volume;
+    COARSEST * compress::default_gap(volume, mesh.surface_area())
 }
 
 /// Largest `(V + M)/√M` over the axes of the ellipsoid with the same volume and inertia; `(V + M)/√Â` where Â is given.

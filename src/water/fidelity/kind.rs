@@ -38,6 +38,9 @@ pub(crate) struct StartGap {
     pub film: f64,
 }
 
+/// The gaps at the start that are under a distance, m.
+pub(crate) type GapsWithin<'a> = dyn Fn(f64) -> Vec<StartGap> + 'a;
+
 /// A model of how the bodies feel each other.
 pub(crate) trait FidelityKind: Send + Sync {
     /// The choices that it alone, or with others, looks at.
@@ -68,11 +71,11 @@ pub(crate) trait FidelityKind: Send + Sync {
         false
     }
 
-    /// What it chooses for bodies that start at `poses` with these `gaps` between them and to the walls, if it does.
+    /// What it chooses for bodies that start at `poses`, if it does; `within` gives the gaps under a distance (m) between them and to the walls.
     ///
     /// # Errors
     /// An accuracy out of range, or bodies that no choice is known for.
-    fn plan(&self, _: &Problem, _: &[Pose], _: &[StartGap]) -> Result<Planned> {
+    fn plan(&self, _: &Problem, _: &[Pose], _: &GapsWithin) -> Result<Planned> {
         Ok(Planned::default())
     }
 

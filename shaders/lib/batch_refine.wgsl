@@ -182,8 +182,11 @@ fn refine(question: u32, slot: u32, twists: u32, given: u32, status: u32, lane: 
             }
             goes[lane] = go;
             size[lane] = sqrt(square);
-            // What a round divides by.
-            alpha[lane] = select(0.0, 1.0 / size[lane], go != 0u);
+            // What a round multiplies by.
+            alpha[lane] = 0.0;
+            if go != 0u {
+                alpha[lane] = 1.0 / sqrt(square);
+            }
         }
         workgroupBarrier();
         if lane == 0u {

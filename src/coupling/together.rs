@@ -15,11 +15,11 @@ pub trait Together: Send + Sync {
     /// The coupling of all of them: it asks from the seat of the member that runs on its thread, and answers by itself where none does.
     fn coupling(&self) -> Arc<dyn Coupling>;
 
-    /// Calls `member` for each seat, all side by side, and returns when all are done. Seats for which there is no thread or memory are left out. A member
-    /// may be halted wherever it asks, so that it must hold no lock there that another needs.
+    /// Calls `member` for each seat, all side by side, and returns when all are done; once. Seats for which there is no thread or memory are left out. A member
+    /// may be halted wherever it asks, so that it must hold no lock there that another needs, nor ask from a parallel iterator, nor wait for another member.
     ///
     /// # Errors
-    /// Threads that can't be started.
+    /// Threads or memory that can't be had.
     fn side_by_side(&self, member: &(dyn Fn(usize) + Sync)) -> Result<()>;
 
     /// What was done so far.

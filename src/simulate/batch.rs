@@ -48,7 +48,7 @@ pub struct BatchReport {
 
 impl Simulator {
     /// Rollouts of many members, in their order: those of [`Simulator::rollout_as_far`]. `progress` is called after each step of any of them, and ends the
-    /// batch where it breaks.
+    /// batch where it breaks; it must not wait for another member.
     ///
     /// With the backend gpu and the fidelity reduced their couplings are computed together, as many as there is memory for ([`BatchReport`]); what a member
     /// becomes doesn't depend on the others, to the last bit. Everywhere else they are the rollouts by themselves, to the last bit.
@@ -203,7 +203,7 @@ fn seated<T: Send>(
         .collect();
     out.ok_or_else(|| Error::Unsupported {
         what: format!("a batch of {members} members"),
-        why: "no thread or memory could be had for any, or a member ended without a result".into(),
+        why: "a member ended without a result".into(),
         instead: "use fewer members, or the backend cpu".into(),
     })
 }

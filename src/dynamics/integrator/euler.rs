@@ -179,9 +179,10 @@ pub(super) fn solve_stage<'a>(
         previous = residual;
         let factor = if iteration == 0 {
             let factor = equation.first_factor(&now)?;
-            let (weight, noise, at) = (equation.weight(), equation.noise(), |v| equation.at(v));
+            let (weight, at) = (equation.weight(), |v| equation.at(v));
+            let ends = [equation.noise(), quasi::solved(e)];
             let found = (factor.as_ref())
-                .and_then(|factor| quasi::descend(split, &weight, factor, &now, noise, at));
+                .and_then(|factor| quasi::descend(split, &weight, factor, &now, ends, at));
             if let Some(found) = found {
                 return Ok(found.into());
             }

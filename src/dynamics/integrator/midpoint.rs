@@ -112,8 +112,8 @@ fn at_once(
         let m = middle(start, &v)?;
         Equation::new(start, &m, p, rule).at(v)
     };
-    let weight = equation.weight();
-    let found = quasi::descend(split, &weight, &factor, &first, noise(&m), at);
+    let (weight, ends) = (equation.weight(), [noise(&m), quasi::solved(&m)]);
+    let found = quasi::descend(split, &weight, &factor, &first, ends, at);
     Ok(found)
 }
 

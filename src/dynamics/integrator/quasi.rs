@@ -6,6 +6,7 @@
 
 use super::split::Split;
 use super::stage_factor::StageFactor;
+use crate::dynamics::Linearisation;
 use nalgebra::DVector;
 
 /// Most steps.
@@ -39,14 +40,22 @@ impl Trial {
     }
 }
 
+/// Residual at which a stage at `e` is solved: rounding, of one by a factor.
+pub(super) fn solved(e: &Linearisation) -> f64 {
+    match e.scattered() {
+        Some(_) => SOLVED,
+        None => 0.0,
+    }
+}
+
 /// The solution from `first` on, `factor` being that of the stage's matrix about there, and `weight` the inertia of each free velocity; none where each step doesn't come much nearer, but for residuals under `noise`, of which
-/// nothing more can be told.
+/// nothing more can be told; those up to `solved` end it at once.
 pub(super) fn descend(
     split: &Split,
     weight: &DVector<f64>,
     factor: &StageFactor,
     first: &Trial,
-    noise: f64,
+    [noise, solved]: [f64; 2],
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,
 ) -> Option<Trial> {
     // Steps made, each with its dual by the inertia.
@@ -58,8 +67,7 @@ pub(super) fn descend(
         let step = -&back;
         let now = at(&v + split.put(&step)).ok()?;
         let stalled = now.residual > 0.5 * previous;
-        let solved = now.residual <= noise.min(SOLVED);
-        if solved || now.converged(previous) || (stalled && now.residual <= noise) {
+        if now.residual <= solved || now.converged(previous) || (stalled && now.residual <= noise) {
             return Some(now);
         }
         let nearer = now.residual <= LEFT * previous;

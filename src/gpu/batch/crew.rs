@@ -5,13 +5,14 @@ use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
 use std::any::Any;
 use std::cell::Cell;
+use std::marker::PhantomData;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::Builder;
 use std::time::Duration;
 
-/// Stack of a member, bytes; only what is touched of it takes memory.
+/// Stack of a member, bytes; only pages that are touched take memory.
 const STACK: usize = 4 << 20;
 
 /// How often a thread of the pool looks whether others are done while it does the pool's work.
@@ -49,18 +50,33 @@ pub(super) fn make_way(moved: Moved) {
 }
 
 /// A member of a crew, which has begun or not.
-type Place<'a> = (Coroutine<(), Moved, ()>, std::marker::PhantomData<&'a ()>);
+struct Place<'a> {
+    coroutine: Coroutine<(), Moved, ()>,
+    member: PhantomData<&'a (dyn Fn(usize) + Sync)>,
+}
 
-/// One that sits at `seat`, on a stack that there is.
-fn place<'a>(stack: DefaultStack, seat: usize, member: &'a (dyn Fn(usize) + Sync)) -> Place<'a> {
-    let body = move |yielder: &Yielder<(), Moved>, ()| {
-        let yielder = NonNull::from(yielder);
-        RUNNING.set(Some(Running { seat, yielder }));
-        member(seat);
-    };
-    // SAFETY: the body borrows `member` alone, and the lifetime beside the coroutine keeps it from outliving that. Nothing here forgets a coroutine.
-    let coroutine = unsafe { Coroutine::with_stack_unchecked(stack, body) };
-    (coroutine, std::marker::PhantomData)
+impl<'a> Place<'a> {
+    /// One that sits at `seat`, on a stack that there is.
+    fn new(stack: DefaultStack, seat: usize, member: &'a (dyn Fn(usize) + Sync)) -> Self {
+        let body = move |yielder: &Yielder<(), Moved>, ()| {
+            let yielder = NonNull::from(yielder);
+            RUNNING.set(Some(Running { seat, yielder }));
+            member(seat);
+        };
+        // SAFETY: the body borrows `member` alone, which a place doesn't outlive, its drop included. Nothing here forgets a place.
+        let coroutine = unsafe { Coroutine::with_stack_unchecked(stack, body) };
+        Self {
+            coroutine,
+            member: PhantomData,
+        }
+    }
+}
+
+impl Drop for Place<'_> {
+    /// Unwinds what has begun while all that it borrows is still there.
+    fn drop(&mut self) {
+        self.coroutine.force_unwind();
+    }
 }
 
 /// Runs all of a thread's members to their ends. One that panics loses what it did; the first panic is handed on when all others are done.
@@ -68,8 +84,8 @@ fn work(mut places: Vec<Place<'_>>) -> Option<Box<dyn Any + Send>> {
     let mut panicked = None;
     while !places.is_empty() {
         let mut moved = false;
-        places.retain_mut(|(coroutine, _)| {
-            let ran = catch_unwind(AssertUnwindSafe(|| coroutine.resume(())));
+        places.retain_mut(|place| {
+            let ran = catch_unwind(AssertUnwindSafe(|| place.coroutine.resume(())));
             RUNNING.set(None);
             match ran {
                 Ok(CoroutineResult::Yield(asked)) => {
@@ -81,7 +97,11 @@ fn work(mut places: Vec<Place<'_>>) -> Option<Box<dyn Any + Send>> {
                     false
                 }
                 Err(why) => {
-                    panicked.get_or_insert(why);
+                    match panicked {
+                        None => panicked = Some(why),
+                        // What it holds may panic again when it is dropped.
+                        Some(_) => std::mem::forget(why),
+                    }
                     moved = true;
                     false
                 }
@@ -96,19 +116,19 @@ fn work(mut places: Vec<Place<'_>>) -> Option<Box<dyn Any + Send>> {
 }
 
 /// Calls `member` once for each seat, all side by side, while `servers` run beside them. Seats for which there is no thread or memory are given to `leave`
-/// instead; how many they are is returned, with the reason of one.
+/// instead.
 ///
 /// # Errors
-/// A server that has no thread: then nobody sat down.
+/// A server that has no thread, or no thread and memory for any seat: then nobody sat down.
 pub(super) fn side_by_side(
     seats: usize,
     servers: &[&(dyn Fn() + Sync)],
     member: &(dyn Fn(usize) + Sync),
     leave: &(dyn Fn(usize) + Sync),
-) -> std::io::Result<Option<std::io::Error>> {
+) -> std::io::Result<()> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let workers = cores.min(seats);
-    let left = AtomicUsize::new(workers);
+    let (left, seated) = (AtomicUsize::new(workers), AtomicUsize::new(0));
     let mut panicked = None;
     let done = std::thread::scope(|scope| {
         let all = 0..seats;
@@ -125,7 +145,7 @@ pub(super) fn side_by_side(
         for w in 0..workers {
             // All groups of seats on each thread, so that one group is at work while another waits.
             let own = all.clone().skip(w).step_by(workers);
-            let left = &left;
+            let (left, seated) = (&left, &seated);
             let body = {
                 let own = own.clone();
                 move || {
@@ -133,13 +153,14 @@ pub(super) fn side_by_side(
                     let mut places = Vec::new();
                     for seat in own {
                         match DefaultStack::new(STACK) {
-                            Ok(stack) => places.push(place(stack, seat, member)),
+                            Ok(stack) => places.push(Place::new(stack, seat, member)),
                             Err(error) => {
                                 lost = Some(error);
                                 leave(seat);
                             }
                         }
                     }
+                    seated.fetch_add(places.len(), Ordering::Relaxed);
                     let panicked = work(places);
                     left.fetch_sub(1, Ordering::Release);
                     (lost, panicked)
@@ -171,7 +192,10 @@ pub(super) fn side_by_side(
                 Err(why) => panicked = Some(why),
             }
         }
-        Ok(lost)
+        match lost {
+            Some(error) if seated.load(Ordering::Relaxed) == 0 => Err(error),
+            _ => Ok(()),
+        }
     });
     match panicked {
         Some(why) => resume_unwind(why),
@@ -196,8 +220,8 @@ mod tests {
                 make_way(true);
             }
         };
-        let lost = side_by_side(100, &[], &member, &|_| panic!("nobody is left out")).unwrap();
-        assert!(lost.is_none() && seat().is_none());
+        side_by_side(100, &[], &member, &|_| panic!("nobody is left out")).unwrap();
+        assert!(seat().is_none());
         let seen = seen.into_inner().unwrap();
         assert!((0..100).all(|own| seen[own] == (own % 7) * (own % 7 + 1) / 2));
     }

@@ -48,7 +48,7 @@ impl<Q, A> Meeting<Q, A> {
     /// Asks, and makes way for others of this thread until whoever serves has answered.
     ///
     /// # Errors
-    /// What was reported there: all get to know it.
+    /// What was reported there: all get to know it; that nobody is present any more.
     pub fn ask(&self, member: usize, question: Q) -> Answered<A> {
         let cell: Arc<Cell<A>> = Arc::default();
         let asked = Asked {
@@ -58,6 +58,9 @@ impl<Q, A> Meeting<Q, A> {
             cell: cell.clone(),
         };
         let mut state = locked(&self.state);
+        if state.present == 0 {
+            return Err("it was asked of seats that have all been left".into());
+        }
         state.waiting.push(asked);
         self.tell(&state);
         drop(state);
@@ -176,5 +179,6 @@ mod tests {
                 });
             }
         });
+        assert!(meeting.ask(0, 0).is_err(), "nobody is left");
     }
 }

@@ -131,10 +131,10 @@ impl Together for Batch {
         let serve: Vec<_> = serve.collect();
         let servers: Vec<&(dyn Fn() + Sync)> = serve.iter().map(|one| one as _).collect();
         let seats = self.seats();
-        let lost = crew::side_by_side(seats, &servers, &seated, &leave);
-        lost.map(drop).map_err(|error| Error::Unsupported {
+        let ran = crew::side_by_side(seats, &servers, &seated, &leave);
+        ran.map_err(|error| Error::Unsupported {
             what: format!("a batch of {seats} members at a time"),
-            why: format!("no thread could be started for it: {error}"),
+            why: format!("no thread or memory could be had for it: {error}"),
             instead: "use fewer members, or the backend cpu".into(),
         })
     }

@@ -35,7 +35,7 @@ const ROOM_FLAT: f64 = 0.3;
 const FLAT: f64 = 0.05;
 /// Bodies that start apart may come near: they resolve this many times the gap that they would without a plan.
 const COARSEST: f64 = 2.0;
-/// Under this many times the finest gap bodies are compressed no worse than `Reduced` does by default.
+/// Under this many times the finest gap (less than the coarsest over the least room) bodies are compressed no worse than `Reduced` does by default.
 const CLOSE: f64 = 6.0;
 /// `reduced`, with what each body and pair needs.
 pub(super) struct Auto;
@@ -96,7 +96,7 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
             "a number between 0 and 1, such as 0.01",
         ));
     }
-    // Gaps so wide that no body is compressed finer for them aren't looked at.
+    // Gaps so wide that none is resolved finer for them aren't looked at.
     let widest = bodies.iter().filter_map(|body| Some(coarsest(body.mesh?)));
     let gaps = within(widest.fold(0.0, f64::max) / ROOM_FLAT);
     let mut near: Vec<Vec<&StartGap>> = bodies.iter().map(|_| Vec::new()).collect();
@@ -122,12 +122,15 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
         ));
         let distances = near[b].iter().map(|start| start.gap.image_distance());
         let smallest = distances.fold(f64::INFINITY, f64::min);
-        let room = match near[b].iter().any(|start| start.film > FLAT) {
+        let (finest, coarsest) = (compress::finest_gap(mesh.surface_area()), coarsest(mesh));
+        let flat = |start: &&StartGap| {
+            start.film > FLAT && ROOM_FLAT * start.gap.image_distance() < coarsest
+        };
+        let room = match near[b].iter().any(flat) {
             true => ROOM_FLAT,
             false => ROOM,
         };
-        let finest = compress::finest_gap(mesh.surface_area());
-        let gap = (room * smallest).clamp(finest, coarsest(mesh));
+        let gap = (room * smallest).clamp(finest, coarsest);
         // What compression leaves out is worth more the nearer the gap, in the force above all.
         let tolerance = match smallest < CLOSE * finest {
             true => (COMPRESSION * aim).min(compress::CompressSettings::default().tolerance),

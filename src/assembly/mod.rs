@@ -276,8 +276,9 @@ pub(crate) fn assemble(
 fn by_products(scene: &Scene, choices: &Choices) -> bool {
     let exchange = choices.water.numerics.exchange;
     let water = &choices.water;
-    let compressed = water.backend == Backend::Cpu && choices.shape_parameters.is_empty();
-    compressed && water.fidelity.kind().compresses() && exchange.expected(scene)
+    choices.shape_parameters.is_empty()
+        && water.fidelity.kind().compresses()
+        && exchange.expected(scene)
 }
 
 /// Numbers that a step takes at once. Where bodies feel each other through the water, of all velocities with all: the mass matrix with its factor and that of the

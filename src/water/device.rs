@@ -3,6 +3,7 @@
 use super::backend::{Backend, BackendReport, GpuSettings};
 use crate::coupling::full::{Cpu, Full, Model};
 use crate::coupling::reduced::Reduced;
+use crate::coupling::scattering::Scattering;
 use crate::coupling::{Coupling, PanelCoupled};
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -10,7 +11,12 @@ use std::sync::Arc;
 #[cfg(feature = "gpu")]
 use {
     super::backend::{Arithmetic, DeviceReport},
-    crate::gpu::{self, Context, full::Gpu, panel::GpuPanels, reduced::GpuReduced},
+    crate::gpu::{
+        self, Context,
+        full::Gpu,
+        panel::GpuPanels,
+        reduced::{GpuReduced, GpuSums},
+    },
 };
 
 /// The CPU unless a GPU is open.
@@ -109,6 +115,27 @@ impl Device {
             }
         }
         Ok(coupled)
+    }
+
+    /// Many bodies by products, whose sums are made here; `same` are the same bodies for a device.
+    ///
+    /// # Errors
+    /// A device that fails, unless the CPU may take over.
+    pub fn scattering(
+        &mut self,
+        many: Scattering,
+        same: impl FnOnce() -> Result<Reduced>,
+    ) -> Result<Scattering> {
+        #[cfg(feature = "gpu")]
+        if let Some(context) = &self.context {
+            match GpuSums::new(context, same()?) {
+                Ok(sums) => return Ok(many.summed_by(Arc::new(sums))),
+                Err(error) => self.leave(error)?,
+            }
+        }
+        #[cfg(not(feature = "gpu"))]
+        drop(same);
+        Ok(many)
     }
 
     /// The fidelity `Reduced` here.

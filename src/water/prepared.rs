@@ -79,8 +79,7 @@ pub(crate) fn prepare(
     let start: Vec<Pose> = numbers.iter().map(|b| poses[*b]).collect();
     problem.start = &start;
     let compressed = scene.fluid.density > 0.0 && choices.fidelity.kind().compresses();
-    let on_cpu = choices.backend == Backend::Cpu;
-    problem.products = compressed && by_products(choices.numerics.exchange, &problem, on_cpu)?;
+    problem.products = compressed && by_products(choices.numerics.exchange, &problem)?;
     let (fidelity, planned) = plan(
         scene,
         choices.fidelity,

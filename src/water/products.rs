@@ -1,8 +1,9 @@
 //! Compressed bodies that are coupled by products alone: whether, and how.
 
+use super::device::Device;
 use super::exchange::{Exchange, faster};
 use super::method::kind::Problem;
-use crate::coupling::reduced::ReducedBody;
+use crate::coupling::reduced::{Reduced, ReducedBody};
 use crate::coupling::scattering::{Levels, Scattering};
 use crate::geometry::Image;
 use crate::{Error, Result};
@@ -12,12 +13,11 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// [`Error::Unsupported`] where they were asked for and something doesn't take them.
-pub(super) fn by_products(exchange: Exchange, problem: &Problem, on_cpu: bool) -> Result<bool> {
+pub(super) fn by_products(exchange: Exchange, problem: &Problem) -> Result<bool> {
     let given = problem.bodies.iter().any(|b| b.added_mass.is_some());
     let without = [
         (given, "given added masses"),
         (!problem.changes.is_empty(), "shape parameters"),
-        (!on_cpu, "the backend gpu"),
         (problem.mimics, "joints that follow others"),
     ];
     let refused = without.into_iter().find(|(there, _)| *there);
@@ -33,11 +33,15 @@ pub(super) fn by_products(exchange: Exchange, problem: &Problem, on_cpu: bool) -
     }
 }
 
-/// The bodies coupled by products.
+/// The bodies coupled by products, whose sums are made on the device.
 ///
 /// # Errors
-/// An accuracy out of range, or walls that aren't perpendicular to each other.
-pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Result<Scattering> {
+/// An accuracy out of range, walls that aren't perpendicular to each other, or a device that fails.
+pub(super) fn scattering(
+    problem: &Problem,
+    made: Vec<Arc<ReducedBody>>,
+    device: &mut Device,
+) -> Result<Scattering> {
     let names = problem.bodies.iter().map(|b| b.name.to_string()).collect();
     let numerics = problem.numerics;
     // What was chosen for the bodies of a scene follows from the accuracy already.
@@ -47,5 +51,9 @@ pub(super) fn scattering(problem: &Problem, made: Vec<Arc<ReducedBody>>) -> Resu
     };
     let levels = Levels::for_accuracy(aim)?;
     let images = Image::of_walls(problem.walls)?;
-    Scattering::between(made, names, problem.start, images, levels)?.excluding(&problem.excluded)
+    let (bodies, walls, excluded) = (made.clone(), problem.walls, &problem.excluded);
+    let many = Scattering::between(made, names, problem.start, images, levels)?;
+    device.scattering(many.excluding(excluded)?, || {
+        Reduced::new(bodies, walls, |_, _| None)?.excluding(excluded)
+    })
 }

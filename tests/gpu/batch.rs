@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// What all rungs give: value, gradient, its columns, along a displacement, answers to further twists, tangents.
-fn answers(r: &dyn Linearised, bodies: usize, columns: usize) -> Vec<Vec<f64>> {
+pub fn answers(r: &dyn Linearised, bodies: usize, columns: usize) -> Vec<Vec<f64>> {
     let x = DVector::from_vec(wavy(columns, 0.7));
     let y = DVector::from_vec(wavy(columns, 1.9));
     let z = displacement(bodies, 2.3);

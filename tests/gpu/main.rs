@@ -12,6 +12,7 @@ mod panels;
 mod reduced;
 mod refined;
 mod robust;
+mod scattered;
 mod trajectory;
 
 #[path = "../support/mod.rs"]

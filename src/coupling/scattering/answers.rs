@@ -68,7 +68,7 @@ struct Sum {
 }
 
 impl Scattered<'_> {
-    fn kept(&self) -> MutexGuard<'_, Kept> {
+    pub(super) fn kept(&self) -> MutexGuard<'_, Kept> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -85,9 +85,13 @@ impl Scattered<'_> {
     /// Whether all solves so far met their tolerance.
     ///
     /// # Errors
-    /// [`Error::Solver`] for the first that didn't.
+    /// [`Error::Solver`] for the first that didn't, and whatever befell sums that are made elsewhere.
     pub fn check(&self) -> Result<()> {
-        match self.kept().failed {
+        let mut kept = self.kept();
+        if let Some(lost) = kept.lost.take() {
+            return Err(lost);
+        }
+        match kept.failed {
             None => Ok(()),
             Some((iterations, residual)) => Err(Error::Solver {
                 what: match self.nearest() {
@@ -117,7 +121,7 @@ impl Scattered<'_> {
     /// The same to a relative residual.
     fn scattered_to(&self, right: &[f64], goal: f64) -> Vec<f64> {
         let still = DVector::zeros(6 * self.model.bodies.len());
-        let sums = self.sums();
+        let sums = self.making();
         self.solve(right, goal, |a| self.exchanged(&sums, &still, a).0)
     }
 
@@ -236,7 +240,7 @@ impl Scattered<'_> {
                 modes: none,
             });
         }
-        let (sums, tolerance) = (self.sums(), self.model.levels.tolerance);
+        let (sums, tolerance) = (self.making(), self.model.levels.tolerance);
         let modes = match self.known(twists) {
             None => self.scattered(&self.exchanged(&sums, twists, &none).0),
             Some(near) => {
@@ -284,7 +288,7 @@ impl Scattered<'_> {
     ) -> Recoiled {
         let (m, n) = (self.model.mode_count(), first.len());
         let unit = FLUX.sqrt();
-        let sums = self.sums();
+        let sums = self.making();
         // Modes and twists in units of about the root of their energy.
         let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
         let twists = |x: &[f64]| DVector::from_fn(n, |i, _| x[m + i] / scale[i]);

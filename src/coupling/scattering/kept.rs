@@ -1,5 +1,6 @@
 //! What is known at some poses: answers, and what solves cost.
 
+use crate::Error;
 use crate::coupling::CouplingReport;
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -30,6 +31,8 @@ pub(super) struct Kept {
     pub report: CouplingReport,
     /// Iterations and residual of the first solve that missed its tolerance.
     pub failed: Option<(usize, f64)>,
+    /// Why sums that are made elsewhere weren't; told once.
+    pub lost: Option<Error>,
 }
 
 impl Kept {

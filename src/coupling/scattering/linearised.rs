@@ -3,8 +3,7 @@
 use super::Scattering;
 use super::answers::Recoiled;
 use super::kept::Answer;
-use super::places::Places;
-use super::scattered::{Motions, Scattered, mixed, plus};
+use super::scattered::{Motions, Moving, Scattered, mixed, plus};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::reduced::FLUX;
@@ -14,7 +13,6 @@ use crate::coupling::{
 };
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
-use num_dual::Dual64;
 use std::sync::Arc;
 
 /// Columns of a dense basis.
@@ -40,7 +38,7 @@ pub struct ScatteredLinearised<'a> {
 /// Bodies that move as they did, about to be displaced: where to, and what their points see of it while they are still.
 pub struct Displaced<'s, 'a> {
     at: &'s Scattered<'a>,
-    places: Places<Dual64>,
+    moving: Moving,
     answer: Arc<Answer>,
     seen: Vec<f64>,
 }
@@ -48,11 +46,11 @@ pub struct Displaced<'s, 'a> {
 impl<'a> Scattered<'a> {
     /// Bodies with these twists (body frames) that are displaced along `z`.
     pub fn displaced(&self, twists: &DVector<f64>, z: &[Vec6]) -> Displaced<'_, 'a> {
-        let (answer, places) = (self.respond(twists), self.moving(z));
-        let seen = self.tangent_potentials(&places, &answer.charges);
+        let (answer, moving) = (self.respond(twists), self.moving(z));
+        let seen = self.tangent_potentials(&moving, &answer.charges);
         Displaced {
             at: self,
-            places,
+            moving,
             answer,
             seen,
         }
@@ -70,14 +68,14 @@ impl Displaced<'_, '_> {
     /// [`Linearised::carried`] as the twists change at the rates `twists`, which recoiled so.
     pub fn carried(&self, twists: &DVector<f64>, recoiled: &Recoiled) -> Carried {
         let rates = self.at.charges(twists, recoiled.modes());
-        carried(self.at, &self.places, &self.answer.charges, twists, &rates)
+        carried(self.at, &self.moving, &self.answer.charges, twists, &rates)
     }
 }
 
 /// Of charges with themselves, as bodies are displaced and charges change at these rates, those of the twists among them.
 fn carried(
     at: &Scattered,
-    places: &Places<Dual64>,
+    moving: &Moving,
     charges: &[f64],
     twists: &DVector<f64>,
     rates: &[f64],
@@ -86,7 +84,7 @@ fn carried(
         mut impulses,
         gradient,
         rate,
-    } = bent(at, places, charges, rates);
+    } = bent(at, moving, charges, rates);
     at.add_own(twists, &mut impulses);
     Carried {
         momentum: impulses,
@@ -96,15 +94,13 @@ fn carried(
 }
 
 /// The same without what the twists do of each body alone.
-fn bent(at: &Scattered, places: &Places<Dual64>, charges: &[f64], rates: &[f64]) -> Bent {
-    let found = at.gradient_jvp(places, charges, rates);
-    let seen: Vec<f64> = found.potentials.iter().map(|x| x.eps).collect();
+fn bent(at: &Scattered, moving: &Moving, charges: &[f64], rates: &[f64]) -> Bent {
+    let found = at.gradient_jvp(moving, charges, rates);
     let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
-    let [gradient, rate] = found.wrenches_and_rates().map(scaled);
     Bent {
-        impulses: at.impulses_of(&seen),
-        gradient,
-        rate,
+        impulses: at.impulses_of(&found.potentials),
+        gradient: scaled(found.gradient),
+        rate: scaled(found.rate),
     }
 }
 
@@ -157,17 +153,17 @@ impl<'a> ScatteredLinearised<'a> {
     }
 
     /// Of one direction's charges with themselves, as bodies are displaced.
-    fn bent(&self, places: &Places<Dual64>, charges: &[f64]) -> Bent {
+    fn bent(&self, moving: &Moving, charges: &[f64]) -> Bent {
         let at = &self.at;
-        let rates = at.answering(&at.tangent_potentials(places, charges));
-        bent(at, places, charges, &rates)
+        let rates = at.answering(&at.tangent_potentials(moving, charges));
+        bent(at, moving, charges, &rates)
     }
 
     /// The rate of the impulses to charges as bodies are displaced.
     fn impulse_rate(&self, charges: &[f64], z: &[Vec6]) -> DVector<f64> {
         let at = &self.at;
-        let places = at.moving(z);
-        at.impulses_answered(&at.tangent_potentials(&places, charges))
+        let moving = at.moving(z);
+        at.impulses_answered(&at.tangent_potentials(&moving, charges))
     }
 }
 
@@ -212,21 +208,21 @@ impl Linearised for ScatteredLinearised<'_> {
     ) -> Result<Option<Carried>> {
         let at = &self.at;
         let answer = self.respond(&Direction::Basis(x));
-        let places = at.moving(z);
-        let seen = at.tangent_potentials(&places, &answer.charges);
+        let moving = at.moving(z);
+        let seen = at.tangent_potentials(&moving, &answer.charges);
         // Charges that the twists ask for, and those that answer the displacement, in one solve.
         let rates = at.answering_beside(twists, &seen);
-        let found = carried(at, &places, &answer.charges, twists, &rates);
+        let found = carried(at, &moving, &answer.charges, twists, &rates);
         at.check()?;
         Ok(Some(found))
     }
 
     fn hvp(&self, x: Direction, y: Direction, z: &[Vec6]) -> Result<Tangent> {
         let at = &self.at;
-        let places = at.moving(z);
+        let moving = at.moving(z);
         let (x, y) = (self.respond(&x), self.respond(&y));
         let out = if x.charges == y.charges {
-            let bent = self.bent(&places, &x.charges);
+            let bent = self.bent(&moving, &x.charges);
             Tangent {
                 momentum_x: bent.impulses.clone(),
                 momentum_y: bent.impulses,
@@ -235,7 +231,7 @@ impl Linearised for ScatteredLinearised<'_> {
             }
         } else {
             let [sum, difference] =
-                [1.0, -1.0].map(|sign| self.bent(&places, &plus(&x.charges, sign, &y.charges)));
+                [1.0, -1.0].map(|sign| self.bent(&moving, &plus(&x.charges, sign, &y.charges)));
             Tangent {
                 momentum_x: 0.5 * (&sum.impulses + &difference.impulses),
                 momentum_y: 0.5 * (&sum.impulses - &difference.impulses),

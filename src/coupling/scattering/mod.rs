@@ -23,6 +23,7 @@
 mod answers;
 mod blocks;
 mod cells;
+mod elsewhere;
 mod far;
 mod kept;
 mod levels;
@@ -36,6 +37,7 @@ mod scattered;
 mod sums;
 
 pub use answers::{Goal, Recoiled};
+pub use elsewhere::{Changed, Summing, SummingAt};
 pub use kept::Answer;
 pub use levels::{Apart, Levels};
 pub use linearised::{Displaced, ScatteredLinearised};
@@ -75,6 +77,8 @@ pub struct Scattering {
     refused: BTreeSet<[usize; 2]>,
     levels: Levels,
     table: Table,
+    /// Where sums are made instead of here.
+    summing: Option<Arc<dyn Summing>>,
 }
 
 impl Scattering {
@@ -148,6 +152,7 @@ impl Scattering {
             cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
             table: Table::new(levels.degree),
             refused: BTreeSet::new(),
+            summing: None,
             images,
             names,
             levels,
@@ -169,6 +174,12 @@ impl Scattering {
             }
         }
         Ok(self)
+    }
+
+    /// The same, whose sums are made elsewhere: of the same bodies between the same walls, without the same pairs.
+    pub fn summed_by(mut self, summing: Arc<dyn Summing>) -> Self {
+        self.summing = Some(summing);
+        self
     }
 
     /// From bodies that were coupled by a factor.

@@ -2,11 +2,12 @@
 
 use super::Scattering;
 use super::blocks::{Blocks, dot};
+use super::elsewhere::{Changed, SummingAt};
 use super::kept::{Answer, Kept};
 use super::pairs::{Near, Pairs};
 use super::parts::of_each;
 use super::places::{Places, length, minus};
-use super::sums::{Gradient, Sums, dual};
+use super::sums::{Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::adjoint::multipole;
 use crate::coupling::isolated::Isolated;
@@ -26,13 +27,32 @@ pub trait Motions: Send + Sync {
     fn transposed(&self, impulses: &DVector<f64>) -> DVector<f64>;
 }
 
+/// Who makes the sums.
+enum Made {
+    Here(Blocks),
+    Elsewhere(Box<dyn SummingAt>),
+}
+
+/// The same, with what a sum here begins with.
+pub(super) enum Making<'s> {
+    Here(&'s Blocks, Sums<'s, f64>),
+    Elsewhere(&'s dyn SummingAt),
+}
+
+/// Places as bodies are displaced.
+pub(super) enum Moving {
+    Here(Places<Dual64>),
+    /// By spatial twists.
+    Elsewhere(Vec<Vec6>),
+}
+
 /// Many bodies at some poses.
 pub struct Scattered<'a> {
     pub(super) model: &'a Scattering,
     pub(super) poses: Vec<Pose>,
     pub(super) pairs: Pairs,
     places: Places<f64>,
-    blocks: Blocks,
+    making: Made,
     pub(super) motions: Box<dyn Motions + 'a>,
     pub(super) kept: Mutex<Kept>,
 }
@@ -41,7 +61,7 @@ impl Scattering {
     /// Places the bodies.
     ///
     /// # Errors
-    /// [`Error::Input`] for another number of poses.
+    /// [`Error::Input`] for another number of poses; a device that fails.
     pub fn place<'a>(
         &'a self,
         poses: &[Pose],
@@ -56,8 +76,12 @@ impl Scattering {
         }
         let places = Places::new(self, poses);
         let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
+        let making = match &self.summing {
+            Some(summing) => Made::Elsewhere(summing.place(poses)?),
+            None => Made::Here(Blocks::new(&Sums::new(self, &pairs, &places))),
+        };
         Ok(Scattered {
-            blocks: Blocks::new(&Sums::new(self, &pairs, &places)),
+            making,
             pairs,
             places,
             poses: poses.to_vec(),
@@ -100,8 +124,29 @@ impl Scattered<'_> {
         nearest.map(|near| near.bodies.map(|b| b % self.poses.len()))
     }
 
-    pub(super) fn sums(&self) -> Sums<'_, f64> {
+    fn sums(&self) -> Sums<'_, f64> {
         Sums::new(self.model, &self.pairs, &self.places)
+    }
+
+    pub(super) fn making(&self) -> Making<'_> {
+        match &self.making {
+            Made::Here(blocks) => Making::Here(blocks, self.sums()),
+            Made::Elsewhere(at) => Making::Elsewhere(at.as_ref()),
+        }
+    }
+
+    /// What was made elsewhere; something else where it failed, of which [`Scattered::check`] tells.
+    fn told<T>(&self, made: Result<T>, or: impl FnOnce() -> T) -> T {
+        made.unwrap_or_else(|lost| {
+            let mut kept = self.kept();
+            kept.failed.get_or_insert((0, f64::INFINITY));
+            kept.lost.get_or_insert(lost);
+            or()
+        })
+    }
+
+    fn no_wrenches(&self) -> Vec<Vec6> {
+        vec![Vec6::zeros(); self.poses.len()]
     }
 
     /// [L, Ū]ᵀ ψ of every body: of the modes, and of the twists.
@@ -164,19 +209,30 @@ impl Scattered<'_> {
     /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other.
     pub(super) fn exchanged(
         &self,
-        sums: &Sums<'_, f64>,
+        making: &Making<'_>,
         twists: &DVector<f64>,
         modes: &[f64],
     ) -> (Vec<f64>, DVector<f64>) {
         let model = self.model;
+        let (blocks, sums) = match making {
+            Making::Here(blocks, sums) => (blocks, sums),
+            Making::Elsewhere(at) => {
+                let charges = self.charges(twists, modes);
+                let seen = at.potentials(&charges);
+                return self.projected(&self.told(seen, || vec![0.0; charges.len()]));
+            }
+        };
         let points = |b: usize| model.carrier(b).is_none();
         let numbers = self.joined(twists, modes, points);
-        self.parted(&model.numbers, &self.blocks.seen(sums, &numbers), points)
+        self.parted(&model.numbers, &blocks.seen(sums, &numbers), points)
     }
 
     /// 4π αᵀ δĜ α as spatial wrenches.
     pub(super) fn gradient(&self, charges: &[f64]) -> Vec<Vec6> {
-        let found = self.sums().gradient(charges).wrenches();
+        let found = match &self.making {
+            Made::Here(_) => self.sums().gradient(charges).wrenches(),
+            Made::Elsewhere(at) => self.told(at.gradient(charges), || self.no_wrenches()),
+        };
         found.into_iter().map(|w| 2.0 * FLUX * w).collect()
     }
 
@@ -190,12 +246,23 @@ impl Scattered<'_> {
     }
 
     /// The places as the bodies are displaced.
-    pub(super) fn moving(&self, z: &[Vec6]) -> Places<Dual64> {
-        Places::moving(self.model, &self.poses, z)
+    pub(super) fn moving(&self, z: &[Vec6]) -> Moving {
+        match self.making {
+            Made::Here(_) => Moving::Here(Places::moving(self.model, &self.poses, z)),
+            Made::Elsewhere(_) => Moving::Elsewhere(z.to_vec()),
+        }
     }
 
     /// `DĜ[Z] α`.
-    pub(super) fn tangent_potentials(&self, places: &Places<Dual64>, charges: &[f64]) -> Vec<f64> {
+    pub(super) fn tangent_potentials(&self, moving: &Moving, charges: &[f64]) -> Vec<f64> {
+        let places = match (moving, &self.making) {
+            (Moving::Elsewhere(z), Made::Elsewhere(at)) => {
+                let seen = at.potentials_jvp(z, charges);
+                return self.told(seen, || vec![0.0; charges.len()]);
+            }
+            (Moving::Here(places), _) => places,
+            (Moving::Elsewhere(z), _) => &Places::moving(self.model, &self.poses, z),
+        };
         let still = vec![0.0; charges.len()];
         let sums = Sums::new(self.model, &self.pairs, places);
         let seen = sums.potentials(&dual(charges, &still));
@@ -203,19 +270,32 @@ impl Scattered<'_> {
     }
 
     /// The gradient of ½ αᵀ Ĝ α as bodies are displaced and the charges change.
-    pub(super) fn gradient_jvp<'p>(
-        &'p self,
-        places: &'p Places<Dual64>,
-        charges: &[f64],
-        rates: &[f64],
-    ) -> Gradient<'p, Dual64> {
-        Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates))
+    pub(super) fn gradient_jvp(&self, moving: &Moving, charges: &[f64], rates: &[f64]) -> Changed {
+        let places = match (moving, &self.making) {
+            (Moving::Elsewhere(z), Made::Elsewhere(at)) => {
+                let none = || Changed {
+                    potentials: vec![0.0; charges.len()],
+                    gradient: self.no_wrenches(),
+                    rate: self.no_wrenches(),
+                };
+                return self.told(at.gradient_jvp(z, charges, rates), none);
+            }
+            (Moving::Here(places), _) => places,
+            (Moving::Elsewhere(z), _) => &Places::moving(self.model, &self.poses, z),
+        };
+        let found = Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates));
+        let [gradient, rate] = found.wrenches_and_rates();
+        Changed {
+            potentials: found.potentials.iter().map(|x| x.eps).collect(),
+            gradient,
+            rate,
+        }
     }
 
     /// Charges of these twists that answer further potentials with their own.
     pub(super) fn answering_beside(&self, twists: &DVector<f64>, potentials: &[f64]) -> Vec<f64> {
         let none = vec![0.0; self.model.mode_count()];
-        let (mut right, _) = self.exchanged(&self.sums(), twists, &none);
+        let (mut right, _) = self.exchanged(&self.making(), twists, &none);
         let (further, _) = self.projected(potentials);
         right.iter_mut().zip(further).for_each(|(x, y)| *x += y);
         self.charges(twists, &self.scattered(&right))
@@ -232,7 +312,7 @@ impl Scattered<'_> {
         let still = DVector::zeros(6 * self.model.bodies.len());
         let (right, impulses) = self.projected(potentials);
         let answered = self.scattered(&right);
-        impulses + self.exchanged(&self.sums(), &still, &answered).1
+        impulses + self.exchanged(&self.making(), &still, &answered).1
     }
 
     /// 4π Ūᵀ ψ.

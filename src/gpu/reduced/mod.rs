@@ -16,6 +16,9 @@ mod products;
 mod second;
 mod solution;
 mod solve;
+mod sums;
+
+pub use sums::GpuSums;
 
 use super::batch::Batch;
 use super::context::Context;

@@ -35,7 +35,7 @@ impl FidelityKind for Reduced {
 
     fn couple(&self, problem: &Problem, device: &mut Device) -> Result<Made> {
         if problem.products {
-            return many(problem);
+            return many(problem, device);
         }
         let (coupling, unkept) = compressed(problem)?;
         let as_made = as_made(problem, coupling.reduced_bodies())?;
@@ -96,7 +96,7 @@ fn as_made(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<Discretis
 }
 
 /// All bodies coupled by products.
-fn many(problem: &Problem) -> Result<Made> {
+fn many(problem: &Problem, device: &mut Device) -> Result<Made> {
     let (made, unkept) = compressed_bodies(problem)?;
     Ok(Made {
         own: problem.own(|b| Ok(made[b].parts().added_mass))?,
@@ -105,7 +105,7 @@ fn many(problem: &Problem) -> Result<Made> {
         films: Vec::new(),
         warnings: [warnings(problem, &made), unkept].concat(),
         bodies: problem.named(as_made(problem, &made)?),
-        coupling: Box::new(products::scattering(problem, made)?),
+        coupling: Box::new(products::scattering(problem, made, device)?),
     })
 }
 

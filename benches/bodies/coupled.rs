@@ -5,7 +5,7 @@ use hydrograd::adjoint::sample::Samples;
 use hydrograd::coupling::scattering::{Goal, Levels, Motions, Scattering};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
-use hydrograd::simulate::Exchange;
+use hydrograd::simulate::{Backend, Exchange};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator, objective};
 use nalgebra::DVector;
 use std::time::Instant;
@@ -83,10 +83,19 @@ struct Measured {
     whole: f64,
 }
 
+/// The CPU, unless `gpu` is asked for.
+fn backend() -> Backend {
+    match std::env::args().any(|argument| argument == "gpu") {
+        true => Backend::Gpu,
+        false => Backend::Cpu,
+    }
+}
+
 fn measured(scene: &Scene, exchange: Exchange, gradient: bool) -> hydrograd::Result<Measured> {
     let settings = Settings::default()
         .fidelity(Fidelity::Reduced)
         .exchange(exchange)
+        .backend(backend())
         .films(false)
         .integrator(Integrator::Rk2)
         .accuracy(ACCURACY)
@@ -127,8 +136,9 @@ fn peak() -> Option<f64> {
 /// The table of steps against the number of bodies, up to `most`, of the kinds that are asked for.
 pub fn sizes(most: usize, asked: impl Fn(&str) -> bool) -> hydrograd::Result<()> {
     println!(
-        "\n{ACCURACY} asked for, RK2, {} threads; memory is the process's peak so far over that at the start, for each point of a body\n\n| bodies | | points | ms to prepare | ms a step | with gradient | of a step | kB a point | by the factor: times as long | with gradient | accelerations differ by |\n|---|---|---|---|---|---|---|---|---|---|---|",
-        rayon::current_num_threads()
+        "\n{ACCURACY} asked for, RK2, {} threads, backend {:?}; memory is the process's peak so far over that at the start, for each point of a body\n\n| bodies | | points | ms to prepare | ms a step | with gradient | of a step | kB a point | by the factor: times as long | with gradient | accelerations differ by |\n|---|---|---|---|---|---|---|---|---|---|---|",
+        rayon::current_num_threads(),
+        backend()
     );
     let before = peak();
     for (kind, name) in [

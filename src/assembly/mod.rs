@@ -21,7 +21,7 @@ use crate::memory;
 use crate::multibody::Tree;
 use crate::policy::Policy;
 use crate::scene::{Body, Scene, Site};
-use crate::water::{self, Backend, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
+use crate::water::{self, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
 use crate::{Error, Result};
 use bodies::{body_values, elements, hull};
 use nalgebra::DVector;

@@ -19,7 +19,7 @@ choices! {
         Auto,
         /// By a factor of the whole exchange, cubic in the number of bodies.
         Factor,
-        /// By products alone, about linear in it: near bodies by their points, groups of far ones by moments.
+        /// By products alone, about linear in it: near bodies by their points, groups of far ones by moments; with the backend gpu all by their points.
         Products,
     }
 }

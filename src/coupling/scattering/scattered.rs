@@ -75,10 +75,13 @@ impl Scattering {
             ));
         }
         let places = Places::new(self, poses);
-        let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
-        let making = match &self.summing {
-            Some(summing) => Made::Elsewhere(summing.place(poses)?),
-            None => Made::Here(Blocks::new(&Sums::new(self, &pairs, &places))),
+        let (pairs, making) = match &self.summing {
+            Some(summing) => (Pairs::default(), Made::Elsewhere(summing.place(poses)?)),
+            None => {
+                let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
+                let blocks = Blocks::new(&Sums::new(self, &pairs, &places));
+                (pairs, Made::Here(blocks))
+            }
         };
         Ok(Scattered {
             making,

@@ -134,7 +134,7 @@ pub(super) fn side_by_side(
         let all = 0..seats;
         for (n, serve) in servers.iter().enumerate() {
             let made = Builder::new().name(format!("answers {n}"));
-            if let Err(error) = made.spawn_scoped(scope, move || serve()) {
+            if let Err(error) = made.spawn_scoped(scope, serve) {
                 // Those that began end when nobody is present.
                 all.for_each(leave);
                 return Err(error);

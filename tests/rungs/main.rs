@@ -76,6 +76,9 @@ const ON_DEVICE: &[(&str, &str)] = &[
         "gpu::reduced::linearised::GpuLinearised::hvp",
         "coulomb_hvp",
     ),
+    ("gpu::reduced::sums::Placed::gradient", "coulomb_vjp"),
+    ("gpu::reduced::sums::Placed::potentials_jvp", "coulomb_jvp"),
+    ("gpu::reduced::sums::Placed::gradient_jvp", "coulomb_hvp"),
 ];
 
 /// Helpers and declarations that are checked through a registered rung: (helper, rung).

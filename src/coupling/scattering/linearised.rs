@@ -38,7 +38,7 @@ pub struct ScatteredLinearised<'a> {
 /// Bodies that move as they did, about to be displaced: where to, and what their points see of it while they are still.
 pub struct Displaced<'s, 'a> {
     at: &'s Scattered<'a>,
-    moving: Moving,
+    moving: Moving<'s>,
     answer: Arc<Answer>,
     seen: Vec<f64>,
 }

@@ -40,10 +40,10 @@ pub(super) enum Making<'s> {
 }
 
 /// Places as bodies are displaced.
-pub(super) enum Moving {
+pub(super) enum Moving<'s> {
     Here(Places<Dual64>),
     /// By spatial twists.
-    Elsewhere(Vec<Vec6>),
+    Elsewhere(&'s dyn SummingAt, Vec<Vec6>),
 }
 
 /// Many bodies at some poses.
@@ -249,22 +249,21 @@ impl Scattered<'_> {
     }
 
     /// The places as the bodies are displaced.
-    pub(super) fn moving(&self, z: &[Vec6]) -> Moving {
-        match self.making {
+    pub(super) fn moving(&self, z: &[Vec6]) -> Moving<'_> {
+        match &self.making {
             Made::Here(_) => Moving::Here(Places::moving(self.model, &self.poses, z)),
-            Made::Elsewhere(_) => Moving::Elsewhere(z.to_vec()),
+            Made::Elsewhere(at) => Moving::Elsewhere(at.as_ref(), z.to_vec()),
         }
     }
 
     /// `DĜ[Z] α`.
     pub(super) fn tangent_potentials(&self, moving: &Moving, charges: &[f64]) -> Vec<f64> {
-        let places = match (moving, &self.making) {
-            (Moving::Elsewhere(z), Made::Elsewhere(at)) => {
+        let places = match moving {
+            Moving::Elsewhere(at, z) => {
                 let seen = at.potentials_jvp(z, charges);
                 return self.told(seen, || vec![0.0; charges.len()]);
             }
-            (Moving::Here(places), _) => places,
-            (Moving::Elsewhere(z), _) => &Places::moving(self.model, &self.poses, z),
+            Moving::Here(places) => places,
         };
         let still = vec![0.0; charges.len()];
         let sums = Sums::new(self.model, &self.pairs, places);
@@ -274,8 +273,8 @@ impl Scattered<'_> {
 
     /// The gradient of ½ αᵀ Ĝ α as bodies are displaced and the charges change.
     pub(super) fn gradient_jvp(&self, moving: &Moving, charges: &[f64], rates: &[f64]) -> Changed {
-        let places = match (moving, &self.making) {
-            (Moving::Elsewhere(z), Made::Elsewhere(at)) => {
+        let places = match moving {
+            Moving::Elsewhere(at, z) => {
                 let none = || Changed {
                     potentials: vec![0.0; charges.len()],
                     gradient: self.no_wrenches(),
@@ -283,8 +282,7 @@ impl Scattered<'_> {
                 };
                 return self.told(at.gradient_jvp(z, charges, rates), none);
             }
-            (Moving::Here(places), _) => places,
-            (Moving::Elsewhere(z), _) => &Places::moving(self.model, &self.poses, z),
+            Moving::Here(places) => places,
         };
         let found = Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates));
         let [gradient, rate] = found.wrenches_and_rates();

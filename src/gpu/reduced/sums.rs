@@ -110,6 +110,27 @@ impl Placed {
         values.chunks_exact(count).map(of).collect()
     }
 
+    /// The call that sums what pulls do to each body, with its tangent where bodies are displaced and charges change; and where it goes, so many numbers.
+    fn pulled(
+        &self,
+        alpha: &Buffer,
+        pull: &Buffer,
+        changed: Option<(&Table, &Buffer)>,
+    ) -> Result<(Call, Buffer, usize)> {
+        let numbers = changed.map_or(6, |_| 12);
+        let count = numbers * self.model().sizes.bodies;
+        let out = self.reals("wrenches", count)?;
+        let side = Side {
+            alpha,
+            pull,
+            change: changed.map_or(alpha, |(_, change)| change),
+            columns: 1,
+        };
+        let displaced = changed.map(|(table, _)| table);
+        let call = wrench(&self.at, (side, side), displaced, &out)?;
+        Ok((call, out, count))
+    }
+
     /// Runs the calls, and reads.
     fn read(&self, calls: &[Call], wanted: &[(&Buffer, usize)]) -> Result<Vec<Vec<f64>>> {
         let context = &self.model().context;
@@ -129,15 +150,8 @@ impl SummingAt for Placed {
     fn gradient(&self, charges: &[f64]) -> Result<Vec<Vec6>> {
         let Charges { alpha, scale } = self.charges(charges, largest(charges))?;
         let (mut calls, pull) = self.product(Product::Pull, &alpha, self.model().pull())?;
-        let count = 6 * self.model().sizes.bodies;
-        let out = self.reals("wrenches", count)?;
-        let side = Side {
-            alpha: &alpha,
-            pull: &pull,
-            change: &alpha,
-            columns: 1,
-        };
-        calls.push(wrench(&self.at, (side, side), None, &out)?);
+        let (call, out, count) = self.pulled(&alpha, &pull, None)?;
+        calls.push(call);
         let found = self.read(&calls, &[(&out, count)])?;
         Ok(self.wrenches(&found[0], 6, 0, scale * scale))
     }
@@ -157,27 +171,16 @@ impl SummingAt for Placed {
         let change = self.charges(rates, rate)?.alpha;
         let tangent = Product::Tangent(&displaced.table);
         let (mut calls, moved) = self.product(tangent, &alpha, 1)?;
-        let (more, changed) = self.product(Product::Potential, &change, 1)?;
+        let (more, turned) = self.product(Product::Potential, &change, 1)?;
         calls.extend(more);
         let both = Product::PullTangent(&displaced.table, &change);
         let (more, pull) = self.product(both, &alpha, 2 * self.model().pull())?;
         calls.extend(more);
-        let count = 12 * self.model().sizes.bodies;
-        let out = self.reals("wrenches", count)?;
-        let side = Side {
-            alpha: &alpha,
-            pull: &pull,
-            change: &change,
-            columns: 1,
-        };
-        calls.push(wrench(
-            &self.at,
-            (side, side),
-            Some(&displaced.table),
-            &out,
-        )?);
+        let changed = Some((&displaced.table, &change));
+        let (call, out, count) = self.pulled(&alpha, &pull, changed)?;
+        calls.push(call);
         let points = charges.len();
-        let wanted = [(&moved, points), (&changed, points), (&out, count)];
+        let wanted = [(&moved, points), (&turned, points), (&out, count)];
         let found = self.read(&calls, &wanted)?;
         let both = found[0].iter().zip(&found[1]).map(|(x, y)| x + y);
         Ok(Changed {

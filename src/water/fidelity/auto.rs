@@ -97,8 +97,9 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
         ));
     }
     // Gaps so wide that none is resolved finer for them aren't looked at.
-    let widest = bodies.iter().filter_map(|body| Some(coarsest(body.mesh?)));
-    let gaps = within(widest.fold(0.0, f64::max) / ROOM_FLAT);
+    let coarsest = bodies.iter().map(|body| body.mesh.map_or(0.0, coarsest));
+    let coarsest: Vec<f64> = coarsest.collect();
+    let gaps = within(coarsest.iter().copied().fold(0.0, f64::max) / ROOM_FLAT);
     let mut near: Vec<Vec<&StartGap>> = bodies.iter().map(|_| Vec::new()).collect();
     for start in &gaps {
         for (b, _) in start.gap.sides() {
@@ -122,7 +123,7 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
         ));
         let distances = near[b].iter().map(|start| start.gap.image_distance());
         let smallest = distances.fold(f64::INFINITY, f64::min);
-        let (finest, coarsest) = (compress::finest_gap(mesh.surface_area()), coarsest(mesh));
+        let (finest, coarsest) = (compress::finest_gap(mesh.surface_area()), coarsest[b]);
         let flat = |start: &&StartGap| {
             start.film > FLAT && ROOM_FLAT * start.gap.image_distance() < coarsest
         };

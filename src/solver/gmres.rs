@@ -19,9 +19,21 @@ pub fn gmres(
     max_iterations: usize,
     restart: usize,
 ) -> Outcome {
+    gmres_beside(apply, 0, b, tolerance, max_iterations, restart)
+}
+
+/// [`gmres`] where `apply` gives `beside` more rows with M⁻¹ v, linear in v: the solution has them too, at no further product.
+pub fn gmres_beside(
+    apply: impl Fn(&Columns, &[usize]) -> [Columns; 2],
+    beside: usize,
+    b: &Columns,
+    tolerance: f64,
+    max_iterations: usize,
+    restart: usize,
+) -> Outcome {
     CALLS.add(1);
     let n = b.columns;
-    let mut x = Columns::zeros(b.rows, n);
+    let mut x = Columns::zeros(b.rows + beside, n);
     let size = norms(b);
     let mut residual: Vec<f64> = size
         .iter()
@@ -46,7 +58,7 @@ pub fn gmres(
         let [step, change] = arnoldi(&apply, r.clone(), &active, &mut spaces);
         for (c, k) in active.iter().enumerate() {
             iterations[*k] += spaces[c].columns.len();
-            for i in 0..b.rows {
+            for i in 0..x.rows {
                 x.data[i * n + k] += step.at(i, c);
             }
         }
@@ -201,7 +213,7 @@ fn arnoldi(
     }
     let coefficients: Vec<Vec<f64>> = spaces.iter().map(Space::coefficients).collect();
     [0, 1].map(|part| {
-        let mut out = Columns::zeros(basis[0].v.rows, all);
+        let mut out = Columns::zeros(basis[0].images[part].rows, all);
         for (j, step) in basis.iter().enumerate() {
             let image = &step.images[part];
             for i in 0..image.rows {
@@ -288,6 +300,33 @@ mod tests {
             assert_eq!(together.iterations, most);
             assert!(most > 3, "{most}");
         }
+    }
+
+    #[test]
+    fn what_goes_with_the_solution_is_as_linear() {
+        let n = 40;
+        let a = matrix(n);
+        let b = Columns::from_fn(n, 2, |i, k| (0.4 * (i * (k + 1)) as f64).cos());
+        let further = |v: &Columns, i: usize, k: usize| v.at(i, k) - 2.0 * v.at(i + 7, k);
+        let apply = |v: &Columns, _: &[usize]| {
+            let with = Columns::from_fn(n + 3, v.columns, |i, k| match i.checked_sub(n) {
+                None => v.at(i, k),
+                Some(i) => further(v, i, k),
+            });
+            [with, product(&a, n, v)]
+        };
+        for restart in [4, 60] {
+            let found = gmres_beside(apply, 3, &b, 1e-11, 500, restart);
+            assert!(found.residual <= 1e-11, "{}", found.residual);
+            assert_eq!(found.x.rows, n + 3);
+            for (i, k) in (0..3).flat_map(|i| [(i, 0), (i, 1)]) {
+                let (given, made) = (found.x.at(n + i, k), further(&found.x, i, k));
+                assert!((given - made).abs() <= 1e-14, "{given} {made}");
+            }
+        }
+        // Of nothing it is nothing.
+        let none = gmres_beside(apply, 3, &Columns::zeros(n, 1), 1e-11, 9, 9);
+        assert_eq!(none.x.data, vec![0.0; n + 3]);
     }
 
     #[test]

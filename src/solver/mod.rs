@@ -19,7 +19,7 @@ pub use cgls::{Outcome, cgls, cgls_watched};
 pub use cholesky::Cholesky;
 pub use columns::Columns;
 pub(crate) use eigenvalue::{condition, largest_eigenvalue};
-pub use gmres::gmres;
+pub use gmres::{gmres, gmres_beside};
 pub(crate) use inverse_cholesky::AT_ONCE;
 pub use inverse_cholesky::{InverseCholesky, LEAST_RHO};
 pub use lu::Lu;

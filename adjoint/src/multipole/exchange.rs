@@ -31,6 +31,13 @@ pub fn derivatives<T: Arithmetic>(table: &Table, r: &[T; 3], one_more: bool, out
     extend(table, degree, out);
 }
 
+/// All derivatives that products of moments need, from those that tell them.
+#[inline(always)]
+pub fn told<T: Arithmetic>(table: &Table, kept: &[T], out: &mut [T]) {
+    out[..kept.len()].copy_from_slice(kept);
+    extend(table, table.degree(), out);
+}
+
 /// Of what is harmonic, the indices with z = 2 from the others.
 #[inline(always)]
 pub(super) fn extend<T: Arithmetic>(table: &Table, degree: usize, out: &mut [T]) {

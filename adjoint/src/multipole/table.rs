@@ -240,9 +240,9 @@ impl Table {
         self.degree * self.degree
     }
 
-    /// Number of derivatives of 1/r that products of moments need, the first of all.
+    /// Number of derivatives of 1/r, the first of all, that tell all that products of moments need.
     pub fn kept(&self) -> usize {
-        Behind::new(self.degree).last
+        (self.degree + 1) * (self.degree + 1)
     }
 
     /// Room for derivatives of 1/r up to one degree more, those with z = 2 among them.

@@ -6,11 +6,11 @@
 use super::blocks::dot;
 use super::kept::{Answer, Kept};
 use super::levels::Levels;
-use super::scattered::Scattered;
+use super::scattered::{Scattered, plus};
 use crate::coupling::CouplingReport;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::settings::met;
-use crate::solver::{Columns, gmres};
+use crate::solver::{Columns, gmres_beside};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::sync::{Arc, MutexGuard, PoisonError};
@@ -65,6 +65,20 @@ struct Sum {
     twists: DVector<f64>,
     modes: Vec<f64>,
     left: Vec<f64>,
+    exchanged: DVector<f64>,
+}
+
+/// Modes of bodies that stand still, what they see of each other, and the impulses of that (body frames, unit density).
+pub(super) struct Standing {
+    pub modes: Vec<f64>,
+    seen: Vec<f64>,
+    pub impulses: DVector<f64>,
+}
+
+/// x, and what it makes seen: of the modes and as impulses.
+struct Solved {
+    x: Vec<f64>,
+    seen: (Vec<f64>, DVector<f64>),
 }
 
 impl Scattered<'_> {
@@ -114,15 +128,21 @@ impl Scattered<'_> {
     }
 
     /// a = Lᵀ(ψ + Ĝ L a), from what else the modes see.
-    pub(super) fn scattered(&self, right: &[f64]) -> Vec<f64> {
+    pub(super) fn scattered(&self, right: &[f64]) -> Standing {
         self.scattered_to(right, self.model.levels.tolerance)
     }
 
     /// The same to a relative residual.
-    fn scattered_to(&self, right: &[f64], goal: f64) -> Vec<f64> {
+    fn scattered_to(&self, right: &[f64], goal: f64) -> Standing {
         let still = DVector::zeros(6 * self.model.bodies.len());
         let sums = self.making();
-        self.solve(right, goal, |a| self.exchanged(&sums, &still, a).0)
+        let seen = |a: &[f64]| self.exchanged(&sums, &still, a);
+        let Solved { x, seen } = self.solve(right, goal, seen, |(modes, _)| modes.clone());
+        Standing {
+            modes: x,
+            seen: seen.0,
+            impulses: seen.1,
+        }
     }
 
     /// The relative residual of a solve from `right` whose absolute one is given.
@@ -134,22 +154,29 @@ impl Scattered<'_> {
         }
     }
 
-    /// x with x = right + f(x), to a relative residual.
-    fn solve(&self, right: &[f64], goal: f64, f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+    /// x with x = right + f(what x makes seen), to a relative residual. What is seen of the directions of the search adds up to what is seen of x, at no further product.
+    fn solve(
+        &self,
+        right: &[f64],
+        goal: f64,
+        seen: impl Fn(&[f64]) -> (Vec<f64>, DVector<f64>),
+        f: impl Fn(&(Vec<f64>, DVector<f64>)) -> Vec<f64>,
+    ) -> Solved {
         let column = |data: Vec<f64>| Columns {
             rows: data.len(),
             columns: 1,
             data,
         };
         let apply = |v: &Columns, _: &[usize]| {
-            let mut out = v.data.clone();
-            for (out, x) in out.iter_mut().zip(f(&v.data)) {
-                *out -= x;
-            }
-            [v.clone(), column(out)]
+            let seen = seen(&v.data);
+            let image = plus(&v.data, -1.0, &f(&seen));
+            let beside = [&v.data, &seen.0, seen.1.as_slice()].concat();
+            [column(beside), column(image)]
         };
+        let modes = self.model.mode_count();
+        let beside = modes + 6 * self.model.bodies.len();
         let right = column(right.to_vec());
-        let found = gmres(apply, &right, goal, ITERATIONS, RESTART);
+        let found = gmres_beside(apply, beside, &right, goal, ITERATIONS, RESTART);
         // As if the levels' was asked for.
         let tolerance = self.model.levels.tolerance;
         let residual = found.residual * (tolerance / goal);
@@ -159,7 +186,13 @@ impl Scattered<'_> {
         if !met(residual, tolerance) && kept.failed.is_none() {
             kept.failed = Some((found.iterations, found.residual));
         }
-        found.x.data
+        let mut x = found.x.data;
+        let mut seen = x.split_off(right.rows);
+        let impulses = DVector::from_vec(seen.split_off(modes));
+        Solved {
+            x,
+            seen: (seen, impulses),
+        }
     }
 
     /// About the root of twice the energy of twists, each alone and axis by axis, at unit density.
@@ -214,11 +247,13 @@ impl Scattered<'_> {
             twists: DVector::zeros(twists.len()),
             modes: vec![0.0; self.model.mode_count()],
             left: vec![0.0; self.model.mode_count()],
+            exchanged: DVector::zeros(twists.len()),
         };
         for (answer, weight) in known.iter().zip(sum.iter()).filter(|(_, w)| **w != 0.0) {
             out.twists.axpy(*weight, &answer.solved, 1.0);
             add(*weight, &answer.modes, &mut out.modes);
             add(*weight, &answer.left, &mut out.left);
+            out.exchanged.axpy(*weight, &answer.exchanged, 1.0);
         }
         let nearer = self.size(&(twists - &out.twists)) <= NEARER * wanted.norm();
         (!known.is_empty() && nearer).then_some(out)
@@ -241,24 +276,32 @@ impl Scattered<'_> {
             });
         }
         let (sums, tolerance) = (self.making(), self.model.levels.tolerance);
-        let modes = match self.known(twists) {
-            None => self.scattered(&self.exchanged(&sums, twists, &none).0),
+        let (modes, (seen, exchanged)) = match self.known(twists) {
+            None => {
+                let (right, moved) = self.exchanged(&sums, twists, &none);
+                let found = self.scattered(&right);
+                let seen = plus(&right, 1.0, &found.seen);
+                (found.modes, (seen, moved + found.impulses))
+            }
             Some(near) => {
                 let rest = twists - &near.twists;
                 let lacking = self.size(&rest) + FLUX.sqrt() * norm(&near.left);
-                let mut modes = near.modes;
                 if lacking > tolerance * self.size(twists) {
-                    let (mut right, _) = self.exchanged(&sums, &rest, &none);
-                    add(-1.0, &near.left, &mut right);
-                    let goal = self.relative(tolerance * ASKED * norm(&modes), &right);
-                    add(1.0, &self.scattered_to(&right, goal), &mut modes);
+                    let (seen, moved) = self.exchanged(&sums, &rest, &none);
+                    let right = plus(&seen, -1.0, &near.left);
+                    let goal = self.relative(tolerance * ASKED * norm(&near.modes), &right);
+                    let found = self.scattered_to(&right, goal);
+                    // What the sum sees is its modes but for what is left of them, which the right-hand side has.
+                    let seen = plus(&plus(&near.modes, 1.0, &right), 1.0, &found.seen);
+                    let modes = plus(&near.modes, 1.0, &found.modes);
+                    (modes, (seen, near.exchanged + moved + found.impulses))
+                } else {
+                    let seen = self.exchanged(&sums, twists, &near.modes);
+                    (near.modes, seen)
                 }
-                modes
             }
         };
-        let (seen, exchanged) = self.exchanged(&sums, twists, &modes);
-        let mut left = modes.clone();
-        add(-1.0, &seen, &mut left);
+        let left = plus(&modes, -1.0, &seen);
         self.keep(Answer {
             exchanged,
             charges: self.charges(twists, &modes),
@@ -310,21 +353,15 @@ impl Scattered<'_> {
             Goal::Relative(goal) => goal,
             Goal::Absolute(goal) => self.relative(goal, &start),
         };
-        let x = self.solve(&start, goal, |x| next(&seen(x)));
-        let both = seen(&x);
-        let mut left = start;
-        add(1.0, &next(&both), &mut left);
-        add(-1.0, &x, &mut left);
-        let (seen, exchanged) = both;
+        let Solved { x, seen } = self.solve(&start, goal, seen, next);
+        let left = plus(&plus(&start, 1.0, &next(&seen)), -1.0, &x);
         let modes = modes(&x);
-        let mut lacked = modes.clone();
-        add(-1.0, &seen, &mut lacked);
         Recoiled {
-            exchanged,
+            lacked: plus(&modes, -1.0, &seen.0),
+            exchanged: seen.1,
             left,
             twists: twists(&x),
             modes,
-            lacked,
         }
     }
 

@@ -69,7 +69,11 @@ impl Blocks {
         let all = &sums.pairs.near;
         let near = in_parts(all, |_, pairs: &[Near]| {
             let first = pairs.first().map_or(0, |near| near.number);
-            let (mut out, mut room) = (Vec::new(), Room::default());
+            let sizes = pairs.iter().map(|near| {
+                let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
+                rows.next_multiple_of(LANES) * columns
+            });
+            let (mut out, mut room) = (Vec::with_capacity(sizes.sum()), Room::default());
             for near in pairs {
                 let weight = sums.weights.within(near.within);
                 room.matrix(model, sums.places, near, weight, &mut out);
@@ -77,7 +81,7 @@ impl Blocks {
             (first..first + pairs.len(), out)
         });
         Self {
-            far: Derivatives::new(&model.table, sums.places, &sums.pairs.far),
+            far: Derivatives::new(&model.table, sums.places, &sums.weights, &sums.pairs.far),
             moments: moments.concat(),
             near,
         }
@@ -208,19 +212,18 @@ impl Room {
             }
         };
         let (start, room) = (out.len(), rows.next_multiple_of(LANES));
-        out.resize(start + room * columns, 0.0);
-        let own = &mut out[start..];
         match model.carrier(near.bodies[0]) {
             Some(carrier) => {
+                out.resize(start + room * columns, 0.0);
+                let own = &mut out[start..];
                 let own = MatMut::from_column_major_slice_with_stride_mut(own, rows, columns, room);
                 let carrier = carrier.transpose();
                 matmul(own, Accum::Replace, carrier, half, weight, Par::Seq);
             }
             None => {
-                for (own, half) in own.chunks_exact_mut(room).zip(half.col_iter()) {
-                    own.iter_mut()
-                        .zip(half.iter())
-                        .for_each(|(own, x)| *own = weight * x);
+                for half in half.col_iter() {
+                    out.extend(half.iter().map(|x| weight * x));
+                    out.resize(out.len() + room - rows, 0.0);
                 }
             }
         }

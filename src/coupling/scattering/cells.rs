@@ -1,6 +1,8 @@
 //! A tree of the bodies by their places.
 
+use super::parts::FEW;
 use crate::adjoint::lie::Vec3;
+use std::ops::Range;
 
 /// Bodies that lie together.
 #[derive(Clone, Debug)]
@@ -127,6 +129,17 @@ impl Cells {
             out.push(self.cells[last].parent);
         }
         out
+    }
+
+    /// A cell and all that is within it, which stand one after the other.
+    pub fn within(&self, cell: usize) -> Range<usize> {
+        cell..cell + 2 * self.cells[cell].count - 1
+    }
+
+    /// The halves of a cell whose bodies are worth more than one thread.
+    pub fn split(&self, cell: usize) -> Option<[usize; 2]> {
+        let Cell { halves, count, .. } = self.cells[cell];
+        halves.filter(|_| count >= FEW)
     }
 
     /// The bodies of a cell.

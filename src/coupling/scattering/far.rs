@@ -22,23 +22,26 @@ pub(super) struct Moments<'m, T> {
     pub signed: &'m [T],
 }
 
-/// Derivatives of 1/r between the cells of far pairs, which a solve asks for again and again, in the parts that these are summed in.
+/// Weights of far pairs and derivatives of 1/r between their cells, which a solve asks for again and again, in the parts that these are summed in.
 pub(super) struct Derivatives<T: Number> {
     parts: Vec<Vec<T::Pack>>,
 }
 
 impl<T: Number> Derivatives<T> {
-    pub fn new(table: &Table, places: &Places<T>, pairs: &[Far]) -> Self {
+    pub fn new(table: &Table, places: &Places<T>, weights: &Weights<T>, pairs: &[Far]) -> Self {
+        let of_one = |x: &Far, y: &Far| x.cells[0] == y.cells[0];
         let parts = in_parts(pairs, |_, pairs: &[Far]| {
             multipole::vectorized(
                 #[inline(always)]
                 || {
                     let mut d = vec![T::Pack::constant(0.0); table.derivatives()];
-                    let mut out = Vec::new();
-                    for of_one in pairs.chunk_by(|x, y| x.cells[0] == y.cells[0]) {
+                    let packs = pairs.chunk_by(of_one).map(|all| all.len().div_ceil(WIDTH));
+                    let mut out = Vec::with_capacity(packs.sum::<usize>() * (1 + table.kept()));
+                    for of_one in pairs.chunk_by(of_one) {
                         for pairs in of_one.chunks(WIDTH) {
                             let way = ways(places, pairs);
                             multipole::derivatives(table, &way, false, &mut d);
+                            out.push(weighed(weights, pairs));
                             out.extend_from_slice(&d[..table.kept()]);
                         }
                     }
@@ -69,6 +72,16 @@ fn ways<T: Number>(places: &Places<T>, pairs: &[Far]) -> [T::Pack; 3] {
     [T::pack(&out[0]), T::pack(&out[1]), T::pack(&out[2])]
 }
 
+/// The weight of each of some pairs, zero where there are fewer than stand side by side.
+#[inline(always)]
+fn weighed<T: Number>(weights: &Weights<T>, pairs: &[Far]) -> T::Pack {
+    let mut out = [T::constant(0.0); WIDTH];
+    for (out, pair) in out.iter_mut().zip(pairs) {
+        *out = weights.of(pair);
+    }
+    T::pack(&out)
+}
+
 impl<T: Number> Moments<'_, T> {
     /// What the cells of some pairs see of each other, with energies and their slopes if these are asked for; without slopes, by derivatives that are `known`.
     pub fn part(&self, pairs: &[Far], slopes: bool, known: Option<&[T::Pack]>) -> FarPart<T> {
@@ -80,7 +93,7 @@ impl<T: Number> Moments<'_, T> {
 
     #[inline(always)]
     fn part_inlined(&self, pairs: &[Far], slopes: bool, known: Option<&[T::Pack]>) -> FarPart<T> {
-        let mut known = known.map(|known| known.chunks_exact(self.table.kept()));
+        let mut known = known.map(|known| known.chunks_exact(1 + self.table.kept()));
         let (table, n) = (self.table, self.table.moments());
         let zero = T::Pack::constant(0.0);
         let mut out = FarPart {
@@ -103,10 +116,8 @@ impl<T: Number> Moments<'_, T> {
             for pairs in of_one.chunks(WIDTH) {
                 // The last pair again, weightless, where there are fewer.
                 let mut others = [pairs[pairs.len() - 1].cells[1]; WIDTH];
-                let mut weights = [T::constant(0.0); WIDTH];
-                for ((other, weight), pair) in others.iter_mut().zip(&mut weights).zip(pairs) {
+                for (other, pair) in others.iter_mut().zip(pairs) {
                     *other = pair.cells[1];
-                    *weight = self.weights.of(pair);
                 }
                 let rows = others.map(|b| &self.signed[n * b..n * (b + 1)]);
                 for (k, l) in l.iter_mut().enumerate() {
@@ -116,17 +127,19 @@ impl<T: Number> Moments<'_, T> {
                     }
                     *l = T::pack(&column);
                 }
-                let d = match known.as_mut().and_then(Iterator::next) {
-                    Some(known) => known,
-                    None => {
+                let weight = match known.as_mut().and_then(Iterator::next) {
+                    Some([weight, known @ ..]) => {
+                        multipole::told(table, known, &mut d);
+                        *weight
+                    }
+                    _ => {
                         let way = ways(self.places, pairs);
                         multipole::derivatives(table, &way, slopes, &mut d);
-                        &d
+                        weighed(self.weights, pairs)
                     }
                 };
                 seen_l.fill(zero);
-                let weight = T::pack(&weights);
-                multipole::see(table, d, weight, [&*m, &*l], [&mut *seen_m, &mut *seen_l]);
+                multipole::see(table, &d, weight, [&*m, &*l], [&mut *seen_m, &mut *seen_l]);
                 for (seen, sign) in seen_l.iter_mut().zip(table.signs()) {
                     *seen = *seen * *sign;
                 }
@@ -137,7 +150,7 @@ impl<T: Number> Moments<'_, T> {
                     }
                 }
                 if slopes {
-                    let (energy, slope) = multipole::energy(table, d, [&*m, &*l], both);
+                    let (energy, slope) = multipole::energy(table, &d, [&*m, &*l], both);
                     for i in 0..pairs.len() {
                         let slope = [
                             T::lane(&slope[0], i),

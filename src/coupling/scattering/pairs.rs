@@ -104,7 +104,7 @@ impl Pairs {
             }
         }
         // Those of one cell together, as they are summed.
-        out.far.sort_by_key(|far| far.cells);
+        out.far.sort_unstable_by_key(|far| far.cells);
         out
     }
 

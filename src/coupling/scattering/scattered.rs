@@ -299,21 +299,19 @@ impl Scattered<'_> {
         let (mut right, _) = self.exchanged(&self.making(), twists, &none);
         let (further, _) = self.projected(potentials);
         right.iter_mut().zip(further).for_each(|(x, y)| *x += y);
-        self.charges(twists, &self.scattered(&right))
+        self.charges(twists, &self.scattered(&right).modes)
     }
 
     /// Charges that bodies that stand still answer potentials with, L a, a = Lᵀ(ψ + Ĝ L a).
     pub(super) fn answering(&self, potentials: &[f64]) -> Vec<f64> {
         let still = DVector::zeros(6 * self.model.bodies.len());
-        self.charges(&still, &self.scattered(&self.projected(potentials).0))
+        self.charges(&still, &self.scattered(&self.projected(potentials).0).modes)
     }
 
     /// 4π Ūᵀ(ψ + Ĝ α), α those charges.
     pub(super) fn impulses_answered(&self, potentials: &[f64]) -> DVector<f64> {
-        let still = DVector::zeros(6 * self.model.bodies.len());
         let (right, impulses) = self.projected(potentials);
-        let answered = self.scattered(&right);
-        impulses + self.exchanged(&self.making(), &still, &answered).1
+        impulses + self.scattered(&right).impulses
     }
 
     /// 4π Ūᵀ ψ.

@@ -146,14 +146,64 @@ impl<'s, T: Number> Sums<'s, T> {
         for (own, leaf) in of_bodies.chunks_exact(n).zip(&cells.leaf) {
             out[n * leaf..][..n].copy_from_slice(own);
         }
-        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
-        for i in (1..cells.cells.len()).rev() {
-            self.shift(i, &mut powers);
-            let (above, own) = out.split_at_mut(n * i);
-            let above = &mut above[n * cells.cells[i].parent..][..n];
-            multipole::shift(table, &powers, &own[..n], above, &mut room);
+        if !cells.cells.is_empty() {
+            self.gather(0, &mut out);
         }
         out
+    }
+
+    /// Adds up the moments within a cell, which stand in `out` with its own first.
+    fn gather(&self, cell: usize, out: &mut [T]) {
+        let (table, cells) = (&self.model.table, &self.model.cells);
+        let n = table.moments();
+        let zero = T::constant(0.0);
+        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
+        let mut add = |i: usize, above: &mut [T], own: &[T]| {
+            self.shift(i, &mut powers);
+            multipole::shift(table, &powers, &own[..n], &mut above[..n], &mut room);
+        };
+        let Some([left, right]) = cells.split(cell) else {
+            for i in cells.within(cell).skip(1).rev() {
+                let (above, own) = out.split_at_mut(n * (i - cell));
+                add(i, &mut above[n * (cells.cells[i].parent - cell)..], own);
+            }
+            return;
+        };
+        let (own, rest) = out.split_at_mut(n);
+        let (of_left, of_right) = rest.split_at_mut(n * (right - left));
+        rayon::join(
+            || self.gather(left, of_left),
+            || self.gather(right, of_right),
+        );
+        add(right, own, of_right);
+        add(left, own, of_left);
+    }
+
+    /// The transpose of [`Sums::gather`]: hands what a cell sees on to all within it.
+    fn spread(&self, cell: usize, out: &mut [T]) {
+        let (table, cells) = (&self.model.table, &self.model.cells);
+        let n = table.moments();
+        let zero = T::constant(0.0);
+        let (mut powers, mut room) = (vec![zero; n], vec![zero; table.derivatives()]);
+        let mut add = |i: usize, above: &[T], own: &mut [T]| {
+            self.shift(i, &mut powers);
+            multipole::shift_back(table, &powers, &above[..n], &mut own[..n], &mut room);
+        };
+        let Some([left, right]) = cells.split(cell) else {
+            for i in cells.within(cell).skip(1) {
+                let (above, own) = out.split_at_mut(n * (i - cell));
+                add(i, &above[n * (cells.cells[i].parent - cell)..], own);
+            }
+            return;
+        };
+        let (own, rest) = out.split_at_mut(n);
+        let (of_left, of_right) = rest.split_at_mut(n * (right - left));
+        add(left, own, of_left);
+        add(right, own, of_right);
+        rayon::join(
+            || self.spread(left, of_left),
+            || self.spread(right, of_right),
+        );
     }
 
     /// Coefficients of the potentials about all cells' centres, from all that they see; with what each far pair is worth if asked for.
@@ -163,7 +213,7 @@ impl<'s, T: Number> Sums<'s, T> {
         slopes: bool,
         known: Option<&Derivatives<T>>,
     ) -> (Vec<T>, Vec<(T, Triple<T>)>) {
-        let (table, cells) = (&self.model.table, &self.model.cells.cells);
+        let table = &self.model.table;
         let n = table.moments();
         let mut signed = plain.to_vec();
         for (m, out) in plain.chunks_exact(n).zip(signed.chunks_exact_mut(n)) {
@@ -187,13 +237,8 @@ impl<'s, T: Number> Sums<'s, T> {
             }
             worth.extend(part.slopes);
         }
-        let mut powers = vec![T::constant(0.0); n];
-        let mut room = vec![T::constant(0.0); table.derivatives()];
-        for (i, cell) in cells.iter().enumerate().skip(1) {
-            self.shift(i, &mut powers);
-            let (above, own) = out.split_at_mut(n * i);
-            let bar = &above[n * cell.parent..][..n];
-            multipole::shift_back(table, &powers, bar, &mut own[..n], &mut room);
+        if !out.is_empty() {
+            self.spread(0, &mut out);
         }
         (out, worth)
     }

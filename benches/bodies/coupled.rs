@@ -4,16 +4,18 @@ use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::coupling::scattering::{Goal, Levels, Motions, Scattering};
 use hydrograd::dynamics::Integrator;
+use hydrograd::objective::Objective;
 use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::simulate::{Backend, Exchange};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator, objective};
 use nalgebra::DVector;
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 const ACCURACY: f64 = 0.01;
 const STEP: f64 = 0.01;
-/// Steps of each measurement, and bodies up to which the factor is measured beside.
-const STEPS: usize = 4;
+/// Steps of each measurement, the first of which isn't counted, and bodies up to which the factor is measured beside.
+const STEPS: usize = 5;
 const BY_FACTOR: usize = 64;
 const SIZES: [usize; 7] = [2, 4, 16, 64, 256, 1024, 4096];
 
@@ -91,6 +93,14 @@ fn backend() -> Backend {
     }
 }
 
+/// Seconds from one to the next. What a rollout and a sweep back begin and end with is no step.
+fn between(ends: &[Instant]) -> f64 {
+    match ends {
+        [first, .., last] => last.duration_since(*first).as_secs_f64() / (ends.len() - 1) as f64,
+        _ => 0.0,
+    }
+}
+
 fn measured(scene: &Scene, exchange: Exchange, gradient: bool) -> hydrograd::Result<Measured> {
     let settings = Settings::default()
         .fidelity(Fidelity::Reduced)
@@ -104,13 +114,25 @@ fn measured(scene: &Scene, exchange: Exchange, gradient: bool) -> hydrograd::Res
     let simulator = Simulator::new(scene, settings)?;
     let prepared = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, STEPS);
-    let start = Instant::now();
-    let rollout = simulator.rollout(&controls)?;
-    let forward = start.elapsed().as_secs_f64() / STEPS as f64;
+    // What a rollout begins and ends with is no step.
+    let mut ends = Vec::with_capacity(STEPS);
+    let mut stepped = |_| {
+        ends.push(Instant::now());
+        ControlFlow::Continue(())
+    };
+    let rollout = simulator.rollout_from(&simulator.initial()?, &controls, &mut stepped)?;
+    let forward = between(&ends);
+    let mut whole = forward;
     if gradient {
-        rollout.gradient(&objective::final_velocity(0, 0.0, 1.0))?;
+        ends.clear();
+        let mut stepped = |_| {
+            ends.push(Instant::now());
+            ControlFlow::Continue(())
+        };
+        let goal = objective::final_velocity(0, 0.0, 1.0);
+        rollout.vjp_with(&goal.cotangents(&rollout), &mut stepped)?;
+        whole += between(&ends);
     }
-    let whole = start.elapsed().as_secs_f64() / STEPS as f64;
     Ok(Measured {
         rollout,
         prepared,

@@ -208,14 +208,22 @@ fn arnoldi(
         if left.is_empty() {
             break;
         }
+        v = match left.len() == owners.len() {
+            true => w,
+            false => select(&w, &left),
+        };
         owners = left.iter().map(|c| owners[*c]).collect();
-        v = select(&w, &left);
     }
     let coefficients: Vec<Vec<f64>> = spaces.iter().map(Space::coefficients).collect();
     [0, 1].map(|part| {
         let mut out = Columns::zeros(basis[0].images[part].rows, all);
         for (j, step) in basis.iter().enumerate() {
             let image = &step.images[part];
+            if step.owners.len() == all {
+                let scale: Vec<f64> = coefficients.iter().map(|of| of[j]).collect();
+                out.add_scaled(image, &scale);
+                continue;
+            }
             for i in 0..image.rows {
                 for (x, k) in image.row(i).iter().zip(&step.owners) {
                     out.data[i * all + k] += x * coefficients[*k][j];

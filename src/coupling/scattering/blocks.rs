@@ -8,6 +8,7 @@ use super::far::Derivatives;
 use super::pairs::Near;
 use super::parts::{FEW, in_parts, of_each};
 use super::places::Places;
+use super::spare::Spare;
 use super::sums::Sums;
 use crate::adjoint::multipole::{self, WIDTH};
 use faer::linalg::matmul::matmul;
@@ -28,6 +29,15 @@ pub(super) struct Blocks {
     far: Derivatives<f64>,
     /// Matrices of the near pairs in parts, each with its pairs: column by column, rows of the first body filled up to whole lanes, one pair after the other.
     near: Vec<(Range<usize>, Vec<f64>)>,
+    spare: Spare<f64>,
+}
+
+impl Drop for Blocks {
+    fn drop(&mut self) {
+        for (_, matrices) in std::mem::take(&mut self.near) {
+            self.spare.give(matrices);
+        }
+    }
 }
 
 /// Room for one near pair.
@@ -73,7 +83,7 @@ impl Blocks {
                 let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
                 rows.next_multiple_of(LANES) * columns
             });
-            let (mut out, mut room) = (Vec::with_capacity(sizes.sum()), Room::default());
+            let (mut out, mut room) = (model.spare.take(sizes.sum()), Room::default());
             for near in pairs {
                 let weight = sums.weights.within(near.within);
                 room.matrix(model, sums.places, near, weight, &mut out);
@@ -81,9 +91,16 @@ impl Blocks {
             (first..first + pairs.len(), out)
         });
         Self {
-            far: Derivatives::new(&model.table, sums.places, &sums.weights, &sums.pairs.far),
+            far: Derivatives::new(
+                &model.table,
+                sums.places,
+                &sums.weights,
+                &sums.pairs.far,
+                &model.spare_packs,
+            ),
             moments: moments.concat(),
             near,
+            spare: model.spare.clone(),
         }
     }
 
@@ -197,10 +214,21 @@ impl Room {
                 }
             },
         );
-        let inverse = &self.inverse[..b.len() * stride];
-        let inverse =
-            MatRef::from_column_major_slice_with_stride(inverse, a.len(), b.len(), stride);
-        let half = match model.carrier(near.bodies[1]) {
+        let room = rows.next_multiple_of(LANES);
+        let carriers = near.bodies.map(|b| model.carrier(b));
+        let all = &self.inverse[..b.len() * stride];
+        let mut fill = |column: &[f64]| {
+            out.extend(column.iter().map(|x| weight * x));
+            out.resize(out.len() + room - rows, 0.0);
+        };
+        if let [None, None] = carriers {
+            for column in all.chunks_exact(stride) {
+                fill(&column[..rows]);
+            }
+            return;
+        }
+        let inverse = MatRef::from_column_major_slice_with_stride(all, a.len(), b.len(), stride);
+        let half = match carriers[1] {
             None => inverse,
             Some(carrier) => {
                 self.half.resize(a.len() * columns, 0.0);
@@ -211,21 +239,19 @@ impl Room {
                 half.into_const()
             }
         };
-        let (start, room) = (out.len(), rows.next_multiple_of(LANES));
-        match model.carrier(near.bodies[0]) {
+        match carriers[0] {
             Some(carrier) => {
+                let start = out.len();
                 out.resize(start + room * columns, 0.0);
                 let own = &mut out[start..];
                 let own = MatMut::from_column_major_slice_with_stride_mut(own, rows, columns, room);
                 let carrier = carrier.transpose();
                 matmul(own, Accum::Replace, carrier, half, weight, Par::Seq);
             }
-            None => {
-                for half in half.col_iter() {
-                    out.extend(half.iter().map(|x| weight * x));
-                    out.resize(out.len() + room - rows, 0.0);
-                }
-            }
+            // That of the second is as long as the first's points.
+            None => self.half[..rows * columns]
+                .chunks_exact(rows)
+                .for_each(fill),
         }
     }
 }

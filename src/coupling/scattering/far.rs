@@ -3,6 +3,7 @@
 use super::pairs::{Far, Weights};
 use super::parts::in_parts;
 use super::places::{Places, Triple, add, minus};
+use super::spare::Spare;
 use crate::adjoint::multipole::{self, Arithmetic, Number, Table, WIDTH};
 
 /// What some of the far pairs give.
@@ -25,10 +26,17 @@ pub(super) struct Moments<'m, T> {
 /// Weights of far pairs and derivatives of 1/r between their cells, which a solve asks for again and again, in the parts that these are summed in.
 pub(super) struct Derivatives<T: Number> {
     parts: Vec<Vec<T::Pack>>,
+    spare: Spare<T::Pack>,
 }
 
 impl<T: Number> Derivatives<T> {
-    pub fn new(table: &Table, places: &Places<T>, weights: &Weights<T>, pairs: &[Far]) -> Self {
+    pub fn new(
+        table: &Table,
+        places: &Places<T>,
+        weights: &Weights<T>,
+        pairs: &[Far],
+        spare: &Spare<T::Pack>,
+    ) -> Self {
         let of_one = |x: &Far, y: &Far| x.cells[0] == y.cells[0];
         let parts = in_parts(pairs, |_, pairs: &[Far]| {
             multipole::vectorized(
@@ -36,7 +44,7 @@ impl<T: Number> Derivatives<T> {
                 || {
                     let mut d = vec![T::Pack::constant(0.0); table.derivatives()];
                     let packs = pairs.chunk_by(of_one).map(|all| all.len().div_ceil(WIDTH));
-                    let mut out = Vec::with_capacity(packs.sum::<usize>() * (1 + table.kept()));
+                    let mut out = spare.take(packs.sum::<usize>() * (1 + table.kept()));
                     for of_one in pairs.chunk_by(of_one) {
                         for pairs in of_one.chunks(WIDTH) {
                             let way = ways(places, pairs);
@@ -49,12 +57,22 @@ impl<T: Number> Derivatives<T> {
                 },
             )
         });
-        Self { parts }
+        Self {
+            parts,
+            spare: spare.clone(),
+        }
     }
 
     /// Those of a part.
     pub fn part(&self, number: usize) -> &[T::Pack] {
         &self.parts[number]
+    }
+}
+
+impl<T: Number> Drop for Derivatives<T> {
+    fn drop(&mut self) {
+        let parts = std::mem::take(&mut self.parts);
+        parts.into_iter().for_each(|part| self.spare.give(part));
     }
 }
 

@@ -34,6 +34,7 @@ mod pairs;
 mod parts;
 mod places;
 mod scattered;
+mod spare;
 mod sums;
 
 pub use answers::{Goal, Recoiled};
@@ -48,10 +49,11 @@ use super::isolated::Isolated;
 use super::reduced::{Link, Reduced, ReducedBody};
 use super::settings::{end, ranges};
 use crate::adjoint::lie::{Mat6, Pose};
-use crate::adjoint::multipole::Table;
+use crate::adjoint::multipole::{Pack, Table};
 use crate::geometry::Image;
 use crate::{Error, Result};
 use cells::Cells;
+use spare::Spare;
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
@@ -79,6 +81,9 @@ pub struct Scattering {
     table: Table,
     /// Where sums are made instead of here.
     summing: Option<Arc<dyn Summing>>,
+    /// Of the matrices of near pairs, and of what is kept of far ones.
+    spare: Spare<f64>,
+    spare_packs: Spare<Pack>,
 }
 
 impl Scattering {
@@ -153,6 +158,8 @@ impl Scattering {
             table: Table::new(levels.degree),
             refused: BTreeSet::new(),
             summing: None,
+            spare: Spare::default(),
+            spare_packs: Spare::default(),
             images,
             names,
             levels,

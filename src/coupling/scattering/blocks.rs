@@ -5,7 +5,7 @@
 
 use super::Scattering;
 use super::far::Derivatives;
-use super::pairs::Near;
+use super::pairs::{Near, Weights};
 use super::parts::{FEW, in_parts, of_each};
 use super::places::Places;
 use super::spare::Spare;
@@ -16,6 +16,7 @@ use faer::prelude::IntoConst;
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Rows of a near pair's matrix that are taken together, and columns.
 const LANES: usize = 4;
@@ -30,6 +31,7 @@ pub(super) struct Blocks {
     /// Matrices of the near pairs in parts, each with its pairs: column by column, rows of the first body filled up to whole lanes, one pair after the other.
     near: Vec<(Range<usize>, Vec<f64>)>,
     spare: Spare<f64>,
+    pub weights: Arc<Weights<f64>>,
 }
 
 impl Drop for Blocks {
@@ -101,6 +103,7 @@ impl Blocks {
             moments: moments.concat(),
             near,
             spare: model.spare.clone(),
+            weights: sums.weights.clone(),
         }
     }
 
@@ -217,15 +220,17 @@ impl Room {
         let room = rows.next_multiple_of(LANES);
         let carriers = near.bodies.map(|b| model.carrier(b));
         let all = &self.inverse[..b.len() * stride];
-        let mut fill = |column: &[f64]| {
-            out.extend(column.iter().map(|x| weight * x));
-            out.resize(out.len() + room - rows, 0.0);
+        let start = out.len();
+        out.resize(start + room * columns, 0.0);
+        let own = &mut out[start..];
+        let fill = |own: &mut [f64], all: &[f64], stride: usize| {
+            for (own, column) in own.chunks_exact_mut(room).zip(all.chunks_exact(stride)) {
+                let each = own[..rows].iter_mut().zip(column);
+                each.for_each(|(own, x)| *own = weight * x);
+            }
         };
         if let [None, None] = carriers {
-            for column in all.chunks_exact(stride) {
-                fill(&column[..rows]);
-            }
-            return;
+            return fill(own, all, stride);
         }
         let inverse = MatRef::from_column_major_slice_with_stride(all, a.len(), b.len(), stride);
         let half = match carriers[1] {
@@ -241,17 +246,12 @@ impl Room {
         };
         match carriers[0] {
             Some(carrier) => {
-                let start = out.len();
-                out.resize(start + room * columns, 0.0);
-                let own = &mut out[start..];
                 let own = MatMut::from_column_major_slice_with_stride_mut(own, rows, columns, room);
                 let carrier = carrier.transpose();
                 matmul(own, Accum::Replace, carrier, half, weight, Par::Seq);
             }
             // That of the second is as long as the first's points.
-            None => self.half[..rows * columns]
-                .chunks_exact(rows)
-                .for_each(fill),
+            None => fill(own, &self.half, rows),
         }
     }
 }

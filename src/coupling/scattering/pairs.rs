@@ -103,8 +103,7 @@ impl Pairs {
                 }),
             }
         }
-        // Those of one cell together, as they are summed.
-        out.far.sort_unstable_by_key(|far| far.cells);
+        out.far = together(out.far, cells.cells.len());
         out
     }
 
@@ -125,6 +124,22 @@ impl Pairs {
         }
         out
     }
+}
+
+/// Pairs of one first cell together, as they are summed, in the order in which they were found.
+fn together(far: Vec<Far>, cells: usize) -> Vec<Far> {
+    let mut next = vec![0; cells + 1];
+    far.iter().for_each(|pair| next[pair.cells[0] + 1] += 1);
+    for i in 0..cells {
+        next[i + 1] += next[i];
+    }
+    let mut out = far.clone();
+    for pair in far {
+        let place = &mut next[pair.cells[0]];
+        out[*place] = pair;
+        *place += 1;
+    }
+    out
 }
 
 /// Weights of the blends.

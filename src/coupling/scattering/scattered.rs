@@ -127,13 +127,18 @@ impl Scattered<'_> {
         nearest.map(|near| near.bodies.map(|b| b % self.poses.len()))
     }
 
-    fn sums(&self) -> Sums<'_, f64> {
-        Sums::new(self.model, &self.pairs, &self.places)
+    fn sums(&self, blocks: &Blocks) -> Sums<'_, f64> {
+        Sums::weighed(
+            self.model,
+            &self.pairs,
+            &self.places,
+            blocks.weights.clone(),
+        )
     }
 
     pub(super) fn making(&self) -> Making<'_> {
         match &self.making {
-            Made::Here(blocks) => Making::Here(blocks, self.sums()),
+            Made::Here(blocks) => Making::Here(blocks, self.sums(blocks)),
             Made::Elsewhere(at) => Making::Elsewhere(at.as_ref()),
         }
     }
@@ -233,7 +238,7 @@ impl Scattered<'_> {
     /// 4π αᵀ δĜ α as spatial wrenches.
     pub(super) fn gradient(&self, charges: &[f64]) -> Vec<Vec6> {
         let found = match &self.making {
-            Made::Here(_) => self.sums().gradient(charges).wrenches(),
+            Made::Here(blocks) => self.sums(blocks).gradient(charges).wrenches(),
             Made::Elsewhere(at) => self.told(at.gradient(charges), || self.no_wrenches()),
         };
         found.into_iter().map(|w| 2.0 * FLUX * w).collect()

@@ -11,13 +11,14 @@ use crate::adjoint::multipole::{self, Arithmetic, Number, WIDTH};
 use num_dual::Dual64;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Sums at some places.
 pub(super) struct Sums<'s, T> {
     pub model: &'s Scattering,
     pub pairs: &'s Pairs,
     pub places: &'s Places<T>,
-    pub weights: Weights<T>,
+    pub weights: Arc<Weights<T>>,
 }
 
 /// The energy's gradient: in the charges the potentials that they see, and in the bodies' places spatial wrenches.
@@ -49,8 +50,19 @@ impl Gradient<'_, Dual64> {
 
 impl<'s, T: Number> Sums<'s, T> {
     pub fn new(model: &'s Scattering, pairs: &'s Pairs, places: &'s Places<T>) -> Self {
+        let weights = Arc::new(pairs.weights(places, &model.levels));
+        Self::weighed(model, pairs, places, weights)
+    }
+
+    /// With the weights of these pairs there.
+    pub fn weighed(
+        model: &'s Scattering,
+        pairs: &'s Pairs,
+        places: &'s Places<T>,
+        weights: Arc<Weights<T>>,
+    ) -> Self {
         Self {
-            weights: pairs.weights(places, &model.levels),
+            weights,
             model,
             pairs,
             places,

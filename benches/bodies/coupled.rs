@@ -114,7 +114,6 @@ fn measured(scene: &Scene, exchange: Exchange, gradient: bool) -> hydrograd::Res
     let simulator = Simulator::new(scene, settings)?;
     let prepared = start.elapsed().as_secs_f64();
     let controls = Controls::zeros(&simulator, STEPS);
-    // What a rollout begins and ends with is no step.
     let mut ends = Vec::with_capacity(STEPS);
     let mut stepped = |_| {
         ends.push(Instant::now());

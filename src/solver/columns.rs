@@ -1,5 +1,6 @@
 //! A few columns side by side.
 
+use crate::adjoint::multipole::vectorized;
 use crate::adjoint::solve::Columnwise;
 use faer::{MatMut, MatRef};
 use std::ops::Range;
@@ -105,19 +106,23 @@ impl Columns {
 
     /// Dot products of equal columns of two arrays, each the same to the last bit whatever stands beside it.
     pub fn dots(&self, other: &Self) -> Vec<f64> {
-        if self.columns == 1 {
-            return vec![dot(&self.data, &other.data)];
+        let n = self.columns;
+        if n == 1 {
+            return vec![vectorized(
+                #[inline(always)]
+                || dot(&self.data, &other.data),
+            )];
         }
         // As `dot` does, column by column.
-        let mut sums = vec![[0.0; LANES + 1]; self.columns];
-        let whole = self.rows / LANES * LANES;
+        let mut sums = vec![0.0; LANES * n];
         for i in 0..self.rows {
-            let lane = if i < whole { i % LANES } else { LANES };
-            for (sums, (a, b)) in sums.iter_mut().zip(self.row(i).iter().zip(other.row(i))) {
-                sums[lane] += a * b;
+            let sums = &mut sums[i % LANES * n..][..n];
+            for (sum, (a, b)) in sums.iter_mut().zip(self.row(i).iter().zip(other.row(i))) {
+                *sum += a * b;
             }
         }
-        sums.iter().map(|sums| sums.iter().sum()).collect()
+        let column = |k: usize| (0..LANES).map(|lane| sums[lane * n + k]).sum();
+        (0..n).map(column).collect()
     }
 
     /// `self += other · diag(scale)`.
@@ -137,19 +142,21 @@ impl Columns {
     }
 }
 
-/// Σ aᵢ bᵢ by lanes that are added up at the end, as fast as the processor's vectors are wide, and what is left over.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES + 1];
+/// Σ aᵢ bᵢ in lanes that are added up at the end: in [`vectorized`] as fast as the processor's vectors are wide.
+#[inline(always)]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; LANES];
     let (mut whole, mut others) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     for (a, b) in (&mut whole).zip(&mut others) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
+        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *lane += a * b;
         }
     }
-    for (a, b) in whole.remainder().iter().zip(others.remainder()) {
-        sums[LANES] += a * b;
+    let rest = whole.remainder().iter().zip(others.remainder());
+    for (lane, (a, b)) in lanes.iter_mut().zip(rest) {
+        *lane += a * b;
     }
-    sums.iter().sum()
+    lanes.iter().sum()
 }
 
 impl Columnwise for Columns {

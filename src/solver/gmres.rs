@@ -55,7 +55,7 @@ pub fn gmres_beside(
             .zip(norms(&r))
             .map(|(k, beta)| Space::new(beta, 0.5 * tolerance * size[*k], limit(*k)))
             .collect();
-        let [step, change] = arnoldi(&apply, r.clone(), &active, &mut spaces);
+        let [step, change] = arnoldi(&apply, beside, r.clone(), &active, &mut spaces);
         for (c, k) in active.iter().enumerate() {
             iterations[*k] += spaces[c].columns.len();
             for i in 0..x.rows {
@@ -156,7 +156,7 @@ impl Space {
 /// One step of all columns that aren't done yet.
 struct Step {
     v: Columns,
-    /// M⁻¹ v and A M⁻¹ v.
+    /// M⁻¹ v, with what goes beside it, and A M⁻¹ v.
     images: [Columns; 2],
     /// Which columns these are.
     owners: Vec<usize>,
@@ -165,6 +165,7 @@ struct Step {
 /// Builds every column's basis from its residual until all are done; the columns' best steps, and A times them.
 fn arnoldi(
     apply: &impl Fn(&Columns, &[usize]) -> [Columns; 2],
+    beside: usize,
     mut v: Columns,
     active: &[usize],
     spaces: &mut [Space],
@@ -178,6 +179,7 @@ fn arnoldi(
     loop {
         let numbers: Vec<usize> = owners.iter().map(|c| active[*c]).collect();
         let images = apply(&v, &numbers);
+        debug_assert_eq!(images[0].rows, v.rows + beside, "rows beside the solution");
         let mut w = images[1].clone();
         basis.push(Step {
             v,

@@ -185,6 +185,19 @@ fn what_is_known_changes_no_answer_and_coarse_solves_add_up() {
     at.check().unwrap();
     assert!(at.report().iterations <= whole + 1);
 
+    // One after the other, each nearly the last: what sums of sums leave doesn't grow.
+    let mut worst = 0.0_f64;
+    let mut twists = x.clone();
+    for _ in 0..30 {
+        twists += 2e-3 * random();
+        let (found, right) = (at.respond(&twists), alone(&twists));
+        let error = (&found.exchanged - &right.0).norm() / right.0.norm();
+        worst = worst.max(error);
+    }
+    at.check().unwrap();
+    println!("thirty, each nearly the last: {worst:.1e}");
+    assert!(worst < 1e-9);
+
     // Bodies of the water's density that are given momenta.
     let own = many.own().to_vec();
     let inertia = |i: usize| 1.0 + own[i / 6][(i % 6, i % 6)];
@@ -487,7 +500,12 @@ fn implicit_integrators_agree_and_have_gradients() {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     // So many that all sums are cut into parts.
-    let scene = swarm(300, 0.5, 1100.0);
+    let mut scene = swarm(300, 0.5, 1100.0);
+    scene.walls.push(Wall {
+        surface: WallSurface::Rigid,
+        point: [0.0, 0.0, -0.2],
+        normal: [0.0, 0.0, 1.0],
+    });
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)

@@ -31,9 +31,9 @@ pub fn derivatives<T: Arithmetic>(table: &Table, r: &[T; 3], one_more: bool, out
     extend(table, degree, out);
 }
 
-/// All derivatives that products of moments need, from those that tell them.
+/// All derivatives that products of moments need, as [`derivatives`] gives them, from the first [`Table::kept`] of them; `out` has room for [`Table::derivatives`].
 #[inline(always)]
-pub fn told<T: Arithmetic>(table: &Table, kept: &[T], out: &mut [T]) {
+pub fn unfold<T: Arithmetic>(table: &Table, kept: &[T], out: &mut [T]) {
     out[..kept.len()].copy_from_slice(kept);
     extend(table, table.degree(), out);
 }
@@ -64,7 +64,7 @@ pub fn signed<T: Arithmetic>(table: &Table, moments: &[T], out: &mut [T]) {
     }
 }
 
-/// What each cloud's moments see of the other: adds `weight` times the coefficients of the potentials to `seen`, of both; those of n
+/// What each cloud's moments see of the other, by all derivatives that products of moments need: adds `weight` times the coefficients of the potentials to `seen`, of both; those of n
 /// without the signs that n itself comes with ([`signed`]).
 #[inline(always)]
 pub fn see<T: Arithmetic>(
@@ -133,4 +133,22 @@ pub fn energy<T: Arithmetic>(
         }
     }
     (energy, slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MOST;
+    use super::*;
+
+    #[test]
+    fn kept_derivatives_tell_all() {
+        for degree in 2..=MOST {
+            let table = Table::new(degree);
+            let mut all = vec![0.0; table.derivatives()];
+            derivatives(&table, &[0.7, -1.1, 0.4], false, &mut all);
+            let mut told = vec![0.0; table.derivatives()];
+            unfold(&table, &all[..table.kept()], &mut told);
+            assert_eq!(told, all, "{degree}");
+        }
+    }
 }

@@ -11,7 +11,7 @@ mod moments;
 mod number;
 mod table;
 
-pub use exchange::{derivatives, energy, see, signed, told};
+pub use exchange::{derivatives, energy, see, signed, unfold};
 pub use moments::{
     add_moments, monomials, potential, potential_gradient, shift, shift_back, shift_gradient,
 };

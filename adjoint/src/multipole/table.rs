@@ -240,7 +240,7 @@ impl Table {
         self.degree * self.degree
     }
 
-    /// Number of derivatives of 1/r, the first of all, that tell all that products of moments need.
+    /// Number of derivatives of 1/r, the first of all, from which all follow that products of moments need ([`unfold`](super::unfold)).
     pub fn kept(&self) -> usize {
         (self.degree + 1) * (self.degree + 1)
     }

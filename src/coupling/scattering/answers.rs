@@ -3,14 +3,13 @@
 //! An answer is linear in the twists. Of others that are known at the same poses the nearest sum is a first guess, of which a solve finds what it lacks: little where a velocity
 //! differs from a known one by known steps.
 
-use super::blocks::dot;
 use super::kept::{Answer, Kept};
 use super::levels::Levels;
 use super::scattered::{Scattered, plus};
 use crate::coupling::CouplingReport;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::settings::met;
-use crate::solver::{Columns, gmres_beside};
+use crate::solver::{Columns, dot, gmres_beside};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::sync::{Arc, MutexGuard, PoisonError};
@@ -154,7 +153,7 @@ impl Scattered<'_> {
         }
     }
 
-    /// x with x = right + f(what x makes seen), to a relative residual. What is seen of the directions of the search adds up to what is seen of x, at no further product.
+    /// x with x = right + f(what x makes seen), both linear, to a relative residual. What is seen of the directions of the search adds up to what is seen of x, at no further product.
     fn solve(
         &self,
         right: &[f64],

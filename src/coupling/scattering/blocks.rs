@@ -11,6 +11,7 @@ use super::places::Places;
 use super::spare::Spare;
 use super::sums::Sums;
 use crate::adjoint::multipole::{self, WIDTH};
+use crate::solver::dot;
 use faer::linalg::matmul::matmul;
 use faer::prelude::IntoConst;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -275,21 +276,4 @@ fn both<const N: usize>(a: &[f64], [x, y]: [&[f64]; 2], [seen, out]: [&mut [f64]
     for (out, sums) in out.iter_mut().zip(&sums) {
         *out += sums.iter().sum::<f64>();
     }
-}
-
-/// Σ xᵢ yᵢ in lanes that are added up at the end, so that it is as fast as the processor's vectors are wide.
-#[inline(always)]
-pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut lanes = [0.0; WIDTH];
-    let (mut eights, mut others) = (x.chunks_exact(WIDTH), y.chunks_exact(WIDTH));
-    for (x, y) in (&mut eights).zip(&mut others) {
-        for ((lane, x), y) in lanes.iter_mut().zip(x).zip(y) {
-            *lane += x * y;
-        }
-    }
-    let rest = eights.remainder().iter().zip(others.remainder());
-    for (lane, (x, y)) in lanes.iter_mut().zip(rest) {
-        *lane += x * y;
-    }
-    lanes.iter().sum()
 }

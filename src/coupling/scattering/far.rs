@@ -49,7 +49,7 @@ impl<T: Number> Derivatives<T> {
                         for pairs in of_one.chunks(WIDTH) {
                             let way = ways(places, pairs);
                             multipole::derivatives(table, &way, false, &mut d);
-                            out.push(weighed(weights, pairs));
+                            out.push(weights_of(weights, pairs));
                             out.extend_from_slice(&d[..table.kept()]);
                         }
                     }
@@ -92,7 +92,7 @@ fn ways<T: Number>(places: &Places<T>, pairs: &[Far]) -> [T::Pack; 3] {
 
 /// The weight of each of some pairs, zero where there are fewer than stand side by side.
 #[inline(always)]
-fn weighed<T: Number>(weights: &Weights<T>, pairs: &[Far]) -> T::Pack {
+fn weights_of<T: Number>(weights: &Weights<T>, pairs: &[Far]) -> T::Pack {
     let mut out = [T::constant(0.0); WIDTH];
     for (out, pair) in out.iter_mut().zip(pairs) {
         *out = weights.of(pair);
@@ -111,6 +111,7 @@ impl<T: Number> Moments<'_, T> {
 
     #[inline(always)]
     fn part_inlined(&self, pairs: &[Far], slopes: bool, known: Option<&[T::Pack]>) -> FarPart<T> {
+        debug_assert!(!slopes || known.is_none(), "slopes need one more degree");
         let mut known = known.map(|known| known.chunks_exact(1 + self.table.kept()));
         let (table, n) = (self.table, self.table.moments());
         let zero = T::Pack::constant(0.0);
@@ -145,15 +146,17 @@ impl<T: Number> Moments<'_, T> {
                     }
                     *l = T::pack(&column);
                 }
-                let weight = match known.as_mut().and_then(Iterator::next) {
-                    Some([weight, known @ ..]) => {
-                        multipole::told(table, known, &mut d);
-                        *weight
+                let weight = match known.as_mut() {
+                    // As many as there are packs of pairs.
+                    Some(known) => {
+                        let known = known.next().unwrap_or_default();
+                        multipole::unfold(table, &known[1..], &mut d);
+                        known[0]
                     }
-                    _ => {
+                    None => {
                         let way = ways(self.places, pairs);
                         multipole::derivatives(table, &way, slopes, &mut d);
-                        weighed(self.weights, pairs)
+                        weights_of(self.weights, pairs)
                     }
                 };
                 seen_l.fill(zero);

@@ -81,7 +81,7 @@ pub struct Scattering {
     table: Table,
     /// Where sums are made instead of here.
     summing: Option<Arc<dyn Summing>>,
-    /// Of the matrices of near pairs, and of what is kept of far ones.
+    /// Memory for the matrices of near pairs, and for what is kept of far ones.
     spare: Spare<f64>,
     spare_packs: Spare<Pack>,
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 /// Parts in which pairs are summed: the same whatever the number of threads, so that sums are.
-const PARTS: usize = 8;
+pub(super) const PARTS: usize = 8;
 /// Pairs or bodies that aren't worth another thread.
 pub(super) const FEW: usize = 256;
 

@@ -1,7 +1,7 @@
 //! Many bodies at some poses: what their modes and twists see of each other, and what they answer.
 
 use super::Scattering;
-use super::blocks::{Blocks, dot};
+use super::blocks::Blocks;
 use super::elsewhere::{Changed, SummingAt};
 use super::kept::{Answer, Kept};
 use super::pairs::{Near, Pairs};
@@ -12,6 +12,7 @@ use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::adjoint::multipole;
 use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
+use crate::solver::dot;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -128,7 +129,7 @@ impl Scattered<'_> {
     }
 
     fn sums(&self, blocks: &Blocks) -> Sums<'_, f64> {
-        Sums::weighed(
+        Sums::with_weights(
             self.model,
             &self.pairs,
             &self.places,

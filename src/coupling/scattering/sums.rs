@@ -51,11 +51,11 @@ impl Gradient<'_, Dual64> {
 impl<'s, T: Number> Sums<'s, T> {
     pub fn new(model: &'s Scattering, pairs: &'s Pairs, places: &'s Places<T>) -> Self {
         let weights = Arc::new(pairs.weights(places, &model.levels));
-        Self::weighed(model, pairs, places, weights)
+        Self::with_weights(model, pairs, places, weights)
     }
 
     /// With the weights of these pairs there.
-    pub fn weighed(
+    pub fn with_weights(
         model: &'s Scattering,
         pairs: &'s Pairs,
         places: &'s Places<T>,

@@ -67,17 +67,11 @@ struct Sum {
     exchanged: DVector<f64>,
 }
 
-/// Modes of bodies that stand still, what they see of each other, and the impulses of that (body frames, unit density).
-pub(super) struct Standing {
-    pub modes: Vec<f64>,
+/// The solution of a system, and what it makes seen: of the modes, and as impulses (body frames, unit density).
+pub(super) struct Solved {
+    pub x: Vec<f64>,
     seen: Vec<f64>,
     pub impulses: DVector<f64>,
-}
-
-/// x, and what it makes seen: of the modes and as impulses.
-struct Solved {
-    x: Vec<f64>,
-    seen: (Vec<f64>, DVector<f64>),
 }
 
 impl Scattered<'_> {
@@ -127,21 +121,16 @@ impl Scattered<'_> {
     }
 
     /// a = Lᵀ(ψ + Ĝ L a), from what else the modes see.
-    pub(super) fn scattered(&self, right: &[f64]) -> Standing {
+    pub(super) fn scattered(&self, right: &[f64]) -> Solved {
         self.scattered_to(right, self.model.levels.tolerance)
     }
 
     /// The same to a relative residual.
-    fn scattered_to(&self, right: &[f64], goal: f64) -> Standing {
+    fn scattered_to(&self, right: &[f64], goal: f64) -> Solved {
         let still = DVector::zeros(6 * self.model.bodies.len());
         let sums = self.making();
         let seen = |a: &[f64]| self.exchanged(&sums, &still, a);
-        let Solved { x, seen } = self.solve(right, goal, seen, |(modes, _)| modes.clone());
-        Standing {
-            modes: x,
-            seen: seen.0,
-            impulses: seen.1,
-        }
+        self.solve(right, goal, seen, |modes, _| modes.to_vec())
     }
 
     /// The relative residual of a solve from `right` whose absolute one is given.
@@ -159,7 +148,7 @@ impl Scattered<'_> {
         right: &[f64],
         goal: f64,
         seen: impl Fn(&[f64]) -> (Vec<f64>, DVector<f64>),
-        f: impl Fn(&(Vec<f64>, DVector<f64>)) -> Vec<f64>,
+        f: impl Fn(&[f64], &DVector<f64>) -> Vec<f64>,
     ) -> Solved {
         let column = |data: Vec<f64>| Columns {
             rows: data.len(),
@@ -167,9 +156,9 @@ impl Scattered<'_> {
             data,
         };
         let apply = |v: &Columns, _: &[usize]| {
-            let seen = seen(&v.data);
-            let image = plus(&v.data, -1.0, &f(&seen));
-            let beside = [&v.data, &seen.0, seen.1.as_slice()].concat();
+            let (modes, impulses) = seen(&v.data);
+            let image = plus(&v.data, -1.0, &f(&modes, &impulses));
+            let beside = [&v.data, &modes, impulses.as_slice()].concat();
             [column(beside), column(image)]
         };
         let modes = self.model.mode_count();
@@ -188,10 +177,7 @@ impl Scattered<'_> {
         let mut x = found.x.data;
         let mut seen = x.split_off(right.rows);
         let impulses = DVector::from_vec(seen.split_off(modes));
-        Solved {
-            x,
-            seen: (seen, impulses),
-        }
+        Solved { x, seen, impulses }
     }
 
     /// About the root of twice the energy of twists, each alone and axis by axis, at unit density.
@@ -280,7 +266,7 @@ impl Scattered<'_> {
                 let (right, moved) = self.exchanged(&sums, twists, &none);
                 let found = self.scattered(&right);
                 let seen = plus(&right, 1.0, &found.seen);
-                (found.modes, (seen, moved + found.impulses))
+                (found.x, (seen, moved + found.impulses))
             }
             Some(near) => {
                 let rest = twists - &near.twists;
@@ -292,7 +278,7 @@ impl Scattered<'_> {
                     let found = self.scattered_to(&right, goal);
                     // What the sum sees is its modes but for what is left of them, which the right-hand side has.
                     let seen = plus(&plus(&near.modes, 1.0, &right), 1.0, &found.seen);
-                    let modes = plus(&near.modes, 1.0, &found.modes);
+                    let modes = plus(&near.modes, 1.0, &found.x);
                     (modes, (seen, near.exchanged + moved + found.impulses))
                 } else {
                     let seen = self.exchanged(&sums, twists, &near.modes);
@@ -335,7 +321,7 @@ impl Scattered<'_> {
         let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
         let twists = |x: &[f64]| DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
         let seen = |x: &[f64]| self.exchanged(&sums, &twists(x), &modes(x));
-        let next = |(modes, impulses): &(Vec<f64>, DVector<f64>)| -> Vec<f64> {
+        let next = |modes: &[f64], impulses: &DVector<f64>| -> Vec<f64> {
             let twists = recoil(impulses);
             let modes = modes.iter().map(|a| unit * a);
             let twists = twists.iter().zip(scale.iter()).map(|(t, s)| -t * s);
@@ -352,12 +338,12 @@ impl Scattered<'_> {
             Goal::Relative(goal) => goal,
             Goal::Absolute(goal) => self.relative(goal, &start),
         };
-        let Solved { x, seen } = self.solve(&start, goal, seen, next);
-        let left = plus(&plus(&start, 1.0, &next(&seen)), -1.0, &x);
+        let Solved { x, seen, impulses } = self.solve(&start, goal, seen, next);
+        let left = plus(&plus(&start, 1.0, &next(&seen, &impulses)), -1.0, &x);
         let modes = modes(&x);
         Recoiled {
-            lacked: plus(&modes, -1.0, &seen.0),
-            exchanged: seen.1,
+            lacked: plus(&modes, -1.0, &seen),
+            exchanged: impulses,
             left,
             twists: twists(&x),
             modes,

@@ -305,13 +305,13 @@ impl Scattered<'_> {
         let (mut right, _) = self.exchanged(&self.making(), twists, &none);
         let (further, _) = self.projected(potentials);
         right.iter_mut().zip(further).for_each(|(x, y)| *x += y);
-        self.charges(twists, &self.scattered(&right).modes)
+        self.charges(twists, &self.scattered(&right).x)
     }
 
     /// Charges that bodies that stand still answer potentials with, L a, a = Lᵀ(ψ + Ĝ L a).
     pub(super) fn answering(&self, potentials: &[f64]) -> Vec<f64> {
         let still = DVector::zeros(6 * self.model.bodies.len());
-        self.charges(&still, &self.scattered(&self.projected(potentials).0).modes)
+        self.charges(&still, &self.scattered(&self.projected(potentials).0).x)
     }
 
     /// 4π Ūᵀ(ψ + Ĝ α), α those charges.

@@ -159,13 +159,13 @@ impl<'s, T: Number> Sums<'s, T> {
             out[n * leaf..][..n].copy_from_slice(own);
         }
         if !cells.cells.is_empty() {
-            self.gather(0, &mut out);
+            self.up_within(0, &mut out);
         }
         out
     }
 
     /// Adds up the moments within a cell, which stand in `out` with its own first.
-    fn gather(&self, cell: usize, out: &mut [T]) {
+    fn up_within(&self, cell: usize, out: &mut [T]) {
         let (table, cells) = (&self.model.table, &self.model.cells);
         let n = table.moments();
         let zero = T::constant(0.0);
@@ -184,15 +184,15 @@ impl<'s, T: Number> Sums<'s, T> {
         let (own, rest) = out.split_at_mut(n);
         let (of_left, of_right) = rest.split_at_mut(n * (right - left));
         rayon::join(
-            || self.gather(left, of_left),
-            || self.gather(right, of_right),
+            || self.up_within(left, of_left),
+            || self.up_within(right, of_right),
         );
         add(right, own, of_right);
         add(left, own, of_left);
     }
 
-    /// The transpose of [`Sums::gather`]: hands what a cell sees on to all within it.
-    fn spread(&self, cell: usize, out: &mut [T]) {
+    /// The transpose of [`Sums::up_within`]: hands what a cell sees on to all within it.
+    fn down_within(&self, cell: usize, out: &mut [T]) {
         let (table, cells) = (&self.model.table, &self.model.cells);
         let n = table.moments();
         let zero = T::constant(0.0);
@@ -213,8 +213,8 @@ impl<'s, T: Number> Sums<'s, T> {
         add(left, own, of_left);
         add(right, own, of_right);
         rayon::join(
-            || self.spread(left, of_left),
-            || self.spread(right, of_right),
+            || self.down_within(left, of_left),
+            || self.down_within(right, of_right),
         );
     }
 
@@ -250,7 +250,7 @@ impl<'s, T: Number> Sums<'s, T> {
             worth.extend(part.slopes);
         }
         if !out.is_empty() {
-            self.spread(0, &mut out);
+            self.down_within(0, &mut out);
         }
         (out, worth)
     }

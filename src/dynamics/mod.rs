@@ -1,6 +1,7 @@
 //! Equations of motion: forces, the coupled mass matrix, integrators, and their adjoints.
 
 mod acceleration;
+mod answers;
 mod armature;
 mod balance;
 mod balance_recoil;

@@ -175,6 +175,9 @@ impl Simulator {
         STEP_BYTES
             + BODY_BYTES * system.len() as f64
             + memory::numbers(8.0 * system.tree.velocities() as f64)
+            + memory::numbers(
+                (self.stepper().integrator.answers() * system.answer_numbers()) as f64,
+            )
     }
 
     fn check_sizes(&self, state: &State) -> Result<()> {

@@ -3,7 +3,8 @@
 //! An answer is linear in the twists. Of others that are known at the same poses the nearest sum is a first guess, of which a solve finds what it lacks: little where a velocity
 //! differs from a known one by known steps.
 
-use super::kept::{Answer, Kept};
+use super::Scattering;
+use super::kept::{Answer, Kept, Told};
 use super::levels::Levels;
 use super::scattered::{Scattered, plus};
 use crate::coupling::CouplingReport;
@@ -72,6 +73,13 @@ pub(super) struct Solved {
     pub x: Vec<f64>,
     seen: Vec<f64>,
     pub impulses: DVector<f64>,
+}
+
+impl Scattering {
+    /// Numbers of what is kept of an answer ([`Told`]).
+    pub fn told_numbers(&self) -> usize {
+        3 * 6 * self.bodies.len() + 2 * self.mode_count()
+    }
 }
 
 impl Scattered<'_> {
@@ -301,6 +309,19 @@ impl Scattered<'_> {
         let answer = Arc::new(answer);
         self.kept().keep(answer.clone());
         answer
+    }
+
+    /// What is known of the answer to these body-frame twists.
+    pub fn told_of(&self, twists: &DVector<f64>) -> Option<Told> {
+        self.kept().told(twists)
+    }
+
+    /// Knows an answer from the same poses again.
+    pub fn recall(&self, told: &Told) {
+        if self.kept().found(told.twists()).is_none() {
+            let charges = self.charges(told.twists(), told.modes());
+            self.keep(Answer::again(told.clone(), charges));
+        }
     }
 
     /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),

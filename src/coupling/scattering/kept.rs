@@ -24,6 +24,59 @@ pub struct Answer {
     pub(super) left: Vec<f64>,
 }
 
+/// An answer but for its charges, which follow from the rest: what is kept of it beyond its poses.
+#[derive(Clone, Debug)]
+pub struct Told {
+    twists: DVector<f64>,
+    exchanged: DVector<f64>,
+    solved: DVector<f64>,
+    modes: Vec<f64>,
+    left: Vec<f64>,
+}
+
+impl Told {
+    /// Body-frame twists, 6 a body.
+    pub fn twists(&self) -> &DVector<f64> {
+        &self.twists
+    }
+
+    pub(super) fn modes(&self) -> &[f64] {
+        &self.modes
+    }
+}
+
+impl Answer {
+    /// What is kept of it.
+    fn told(&self) -> Told {
+        Told {
+            twists: self.twists.clone(),
+            exchanged: self.exchanged.clone(),
+            solved: self.solved.clone(),
+            modes: self.modes.clone(),
+            left: self.left.clone(),
+        }
+    }
+
+    /// With charges that follow from the rest.
+    pub(super) fn again(told: Told, charges: Vec<f64>) -> Self {
+        let Told {
+            twists,
+            exchanged,
+            solved,
+            modes,
+            left,
+        } = told;
+        Self {
+            twists,
+            charges,
+            exchanged,
+            solved,
+            modes,
+            left,
+        }
+    }
+}
+
 /// All of it.
 #[derive(Default)]
 pub(super) struct Kept {
@@ -42,6 +95,12 @@ impl Kept {
         let found = self.answers.remove(place);
         self.answers.push(found.clone());
         Some(found)
+    }
+
+    /// What is told of these twists.
+    pub fn told(&self, twists: &DVector<f64>) -> Option<Told> {
+        let found = self.answers.iter().find(|a| a.twists == *twists)?;
+        Some(found.told())
     }
 
     /// Keeps an answer, the oldest of many making room.

@@ -39,7 +39,7 @@ mod sums;
 
 pub use answers::{Goal, Recoiled};
 pub use elsewhere::{Changed, Summing, SummingAt};
-pub use kept::Answer;
+pub use kept::{Answer, Told};
 pub use levels::{Apart, Levels};
 pub use linearised::{Displaced, ScatteredLinearised};
 pub use scattered::{Motions, Scattered};

@@ -81,6 +81,16 @@ impl Integrator {
         }
     }
 
+    /// Answers of the water that are kept of a step, where many bodies are coupled by products.
+    pub(crate) fn answers(self) -> usize {
+        match self {
+            Integrator::Rk2 => 2,
+            Integrator::Rk4 => 4,
+            // That at the start, and of velocities before and after contact.
+            _ => 3,
+        }
+    }
+
     /// Whether it solves contact, and limits of joints, in the velocity by which a step moves.
     pub fn solves_contact(self) -> bool {
         !matches!(self, Integrator::Rk2 | Integrator::Rk4)

@@ -9,6 +9,7 @@ use super::stages::Stages;
 use super::start::Start;
 use super::{Input, Integrator, State, Stepper};
 use super::{euler, midpoint, runge_kutta, velocity_euler};
+use crate::dynamics::answers::Answers;
 use crate::dynamics::contact_force::contact_forces;
 use crate::dynamics::{ContactForce, Linearisation};
 use crate::{Error, Result};
@@ -18,6 +19,7 @@ use nalgebra::DVector;
 struct Piece {
     next: State,
     stages: Stages,
+    answers: Answers,
     passed: Stops,
 }
 
@@ -77,6 +79,7 @@ impl<'a> Stepper<'a> {
         let Piece {
             mut next,
             stages,
+            answers,
             mut passed,
         } = stepper.piece(e, &first, v, input, plan)?;
         let mut later = Vec::with_capacity(n - 1);
@@ -91,6 +94,7 @@ impl<'a> Stepper<'a> {
                 state,
                 v,
                 stages: piece.stages,
+                answers: piece.answers,
             });
         }
         if n > 1 {
@@ -105,6 +109,7 @@ impl<'a> Stepper<'a> {
             dt: self.dt,
             plan: plan.clone(),
             stages,
+            answers,
             later,
             passed,
         };
@@ -144,7 +149,10 @@ impl<'a> Stepper<'a> {
             Stages::Contact(velocities) => self.passed(e, &velocities.after),
             Stages::RungeKutta(_) => Stops::default(),
         };
+        let own = stages.contact_velocities();
+        let own = own.into_iter().flat_map(|c| [&c.before, &c.after]);
         Ok(Piece {
+            answers: e.answers(std::iter::once(v).chain(own)),
             next,
             stages,
             passed,
@@ -159,7 +167,7 @@ impl<'a> Stepper<'a> {
     pub fn contact_forces(&self, record: &StepRecord, slack: f64) -> Result<Vec<ContactForce>> {
         let (system, stepper) = (self.system, self.of_pieces(record));
         let mut out = Vec::new();
-        for (state, v, stages) in record.parts() {
+        for (state, v, _, stages) in record.parts() {
             let kinematics = system.tree.kinematics(&state.q);
             let path = stepper.split_of_step(&state, &record.input).complete(v);
             let seen = stepper.seen(&kinematics, &state.q, &path, &record.plan)?;

@@ -10,6 +10,7 @@ use super::start::Start;
 use super::{Input, Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use super::{euler, midpoint, runge_kutta, velocity_euler};
 use crate::Result;
+use crate::dynamics::answers::Answers;
 use crate::dynamics::{Evaluation, InputTangents, Linearisation};
 use nalgebra::{DMatrix, DVector};
 
@@ -25,6 +26,8 @@ pub struct StepRecord {
     pub(super) plan: Plan,
     /// Of the step, or of its first piece.
     pub(super) stages: Stages,
+    /// What the water answered at its start.
+    pub(super) answers: Answers,
     pub(super) later: Vec<LaterPiece>,
     pub(super) passed: Stops,
 }
@@ -36,6 +39,7 @@ pub(super) struct LaterPiece {
     pub state: State,
     pub v: DVector<f64>,
     pub stages: Stages,
+    pub answers: Answers,
 }
 
 impl StepRecord {
@@ -69,15 +73,15 @@ impl StepRecord {
         self.stages.contact_velocities()
     }
 
-    /// The pieces: each one's start with steps counted in pieces, the velocity read out there, and its stages.
-    pub(super) fn parts(&self) -> impl Iterator<Item = (State, &DVector<f64>, &Stages)> {
+    /// The pieces: each one's start with steps counted in pieces, the velocity read out there, what the water answered there, and its stages.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (State, &DVector<f64>, &Answers, &Stages)> {
         let first = State {
             step: self.plan.pieces * self.state.step,
             ..self.state.clone()
         };
         let later = self.later.iter();
-        let later = later.map(|piece| (piece.state.clone(), &piece.v, &piece.stages));
-        std::iter::once((first, &self.v, &self.stages)).chain(later)
+        let later = later.map(|p| (p.state.clone(), &p.v, &p.answers, &p.stages));
+        std::iter::once((first, &self.v, &self.answers, &self.stages)).chain(later)
     }
 }
 
@@ -119,8 +123,10 @@ impl<'a> Stepper<'a> {
         'a: 's,
     {
         let stepper = self.of_pieces(record);
-        let part = |(state, v, stages): (State, &'s DVector<f64>, &'s Stages)| {
+        type Begun<'s> = (State, &'s DVector<f64>, &'s Answers, &'s Stages);
+        let part = |(state, v, answers, stages): Begun<'s>| {
             let e = stepper.linearise(&state.q, stepper.time(&state))?;
+            e.recall(answers);
             let split = stepper.split_of_step(&state, &record.input);
             let near = stepper.near(&e, &split.complete(v), &record.plan)?;
             let start = Start {
@@ -157,7 +163,12 @@ impl<'a> Stepper<'a> {
         let mut parts = record.parts();
         let first = match parts.next() {
             Some(first) => part(first)?,
-            None => part((record.state.clone(), &record.v, &record.stages))?,
+            None => part((
+                record.state.clone(),
+                &record.v,
+                &record.answers,
+                &record.stages,
+            ))?,
         };
         Ok(LinearisedStep {
             record,

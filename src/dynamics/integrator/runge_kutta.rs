@@ -14,6 +14,7 @@ use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
 use crate::dynamics::Linearisation;
+use crate::dynamics::answers::Answers;
 use crate::dynamics::slopes::columns;
 use nalgebra::{DMatrix, DVector};
 
@@ -50,13 +51,19 @@ impl<'a> RungeKuttaStage<'a> {
     fn at<'s>(&'s self, start: &Start<'s, 'a>) -> &'s Linearisation<'a> {
         self.own.as_ref().unwrap_or(start.e)
     }
+
+    /// Its velocity, and what the water answered to it.
+    fn known(&self, start: &Start<'_, 'a>) -> (DVector<f64>, Answers) {
+        (self.v.clone(), self.at(start).answers([&self.v]))
+    }
 }
 
-/// The stages. `force` gives that of stage i, from its system and velocity.
+/// The stages. `force` gives that of stage i, from its system and velocity; of those after the first velocities and answers may be `known`.
 fn stages<'a>(
     start: &Start<'_, 'a>,
     tableau: &Tableau,
     momentum: &DVector<f64>,
+    known: &[(DVector<f64>, Answers)],
     force: impl Fn(usize, &Linearisation, &DVector<f64>) -> Result<DVector<f64>>,
 ) -> Result<Vec<RungeKuttaStage<'a>>> {
     let (s, state) = (start.stepper, start.state);
@@ -85,10 +92,14 @@ fn stages<'a>(
         let at = own.as_ref().unwrap_or(start.e);
         // The readout's, unless a joint is newly held or released.
         let read_out = i == 0 && split.is_driven == s.split(&state.held, When::At(t)).is_driven;
-        let v = if read_out {
-            start.v.clone()
-        } else {
-            readout::solve(at, &split, &p)?
+        let known = i.checked_sub(1).and_then(|i| known.get(i));
+        let v = match known {
+            _ if read_out => start.v.clone(),
+            Some((v, answers)) => {
+                at.recall(answers);
+                v.clone()
+            }
+            None => readout::solve(at, &split, &p)?,
         };
         let chart_rate = tree.chart_rate(&xi, &v);
         let force = force(i, at, &v)?;
@@ -113,15 +124,26 @@ pub(super) fn step(start: &Start, tableau: &'static Tableau) -> Result<(State, S
     let dt = start.stepper.dt;
     let momentum = start.momentum();
     let control = &start.input.control;
-    let stages = stages(start, tableau, &momentum, |_, e, v| e.force(v, control))?;
+    let stages = stages(start, tableau, &momentum, &[], |_, e, v| {
+        e.force(v, control)
+    })?;
     let zero = DVector::zeros(start.v.len());
     let xi = tableau.sum(dt, zero, stages.iter().map(|s| &s.chart_rate));
     let y = tableau.sum(dt, momentum, stages.iter().map(|s| &s.drifting));
     let y = start.stepper.system.drift.carry(dt, y);
     let next = start.next_state(start.arrive(&xi), y);
+    let known = match start.e.scattered() {
+        Some(_) => stages[1..].iter().map(|stage| stage.known(start)).collect(),
+        None => Vec::new(),
+    };
     let mut all: Vec<DVector<f64>> = stages.into_iter().map(|stage| stage.force).collect();
     all.pop();
-    Ok((next, Stages::RungeKutta(Forces { tableau, all })))
+    let forces = Forces {
+        tableau,
+        all,
+        known,
+    };
+    Ok((next, Stages::RungeKutta(forces)))
 }
 
 /// What the derivatives of a step need.
@@ -140,7 +162,7 @@ impl<'a> Adjoint<'a> {
         let force = |i: usize, _: &Linearisation, _: &DVector<f64>| {
             Ok(forces.all.get(i).cloned().unwrap_or(DVector::zeros(nv)))
         };
-        let stages = stages(start, tableau, &start.momentum(), force)?;
+        let stages = stages(start, tableau, &start.momentum(), &forces.known, force)?;
         let rates = stages.iter().map(|s| &s.chart_rate);
         Ok(Self {
             tableau,

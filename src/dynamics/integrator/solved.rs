@@ -36,7 +36,7 @@ impl Stepper<'_> {
         for contact in self.contact_forces(record, 0.0)? {
             add(&contact, &mut out.contact);
         }
-        for (state, v, stages) in record.parts() {
+        for (state, v, _, stages) in record.parts() {
             let acting = stages.contact_velocities().map_or(v, |v| &v.after);
             if self.integrator.solves_contact() {
                 for (k, limit) in system.limits.iter().enumerate() {

@@ -3,6 +3,7 @@
 use super::start::Start;
 use super::{StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
+use crate::dynamics::answers::Answers;
 use nalgebra::DVector;
 
 /// Velocities of a step that solves contact at its end.
@@ -41,6 +42,8 @@ impl Tableau {
 pub(super) struct Forces {
     pub tableau: &'static Tableau,
     pub all: Vec<DVector<f64>>,
+    /// Of every stage after the first what the water answered, and the velocity.
+    pub known: Vec<(DVector<f64>, Answers)>,
 }
 
 /// What is kept of a step's stages.

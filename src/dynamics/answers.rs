@@ -1,0 +1,41 @@
+//! What the water answered to velocities: kept of a step, so that its derivatives needn't solve for it again.
+
+use super::{Evaluation, System};
+use crate::coupling::scattering::Told;
+use nalgebra::DVector;
+
+/// Answers at one configuration, where many bodies are coupled by products; none elsewhere.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Answers(Vec<Told>);
+
+impl Evaluation<'_> {
+    /// The answers that are known to velocities.
+    pub(super) fn answers<'v>(&self, all: impl IntoIterator<Item = &'v DVector<f64>>) -> Answers {
+        let Some(at) = self.scattered() else {
+            return Answers::default();
+        };
+        let twists = |v| at.motions().twists(&self.through_water(v));
+        let mut out: Vec<Told> = Vec::new();
+        for twists in all.into_iter().map(twists) {
+            if !out.iter().any(|told| *told.twists() == twists) {
+                out.extend(at.told_of(&twists));
+            }
+        }
+        Answers(out)
+    }
+
+    /// Knows answers from here again.
+    pub(super) fn recall(&self, answers: &Answers) {
+        if let Some(at) = self.scattered() {
+            answers.0.iter().for_each(|told| at.recall(told));
+        }
+    }
+}
+
+impl System {
+    /// Numbers that the answer to one velocity takes.
+    pub(crate) fn answer_numbers(&self) -> usize {
+        let many = self.coupling.scattering();
+        many.map_or(0, |many| many.told_numbers())
+    }
+}

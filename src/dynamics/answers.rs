@@ -24,6 +24,17 @@ impl Evaluation<'_> {
         Answers(out)
     }
 
+    /// Begins to look for a velocity from what the water answers to `v` at another configuration, which is near.
+    pub(super) fn begin_near(&self, other: &Self, v: &DVector<f64>) {
+        let (Some(here), Some(there)) = (self.scattered(), other.scattered()) else {
+            return;
+        };
+        let v = self.virtual_direction(v);
+        if let Some(told) = there.told_of(&there.motions().twists(&v)) {
+            here.begin_near(&told, here.motions().twists(&v));
+        }
+    }
+
     /// Knows answers from here again.
     pub(super) fn recall(&self, answers: &Answers) {
         if let Some(at) = self.scattered() {

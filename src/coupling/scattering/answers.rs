@@ -4,7 +4,7 @@
 //! differs from a known one by known steps.
 
 use super::Scattering;
-use super::kept::{Answer, Kept, Told};
+use super::kept::{Answer, Kept, Near, Told};
 use super::levels::Levels;
 use super::scattered::{Scattered, plus};
 use crate::coupling::CouplingReport;
@@ -73,6 +73,17 @@ pub(super) struct Solved {
     pub x: Vec<f64>,
     seen: Vec<f64>,
     pub impulses: DVector<f64>,
+}
+
+impl Solved {
+    /// Nothing, of the sizes of others.
+    fn none(x: &[f64], seen: &[f64], impulses: usize) -> Self {
+        Self {
+            x: vec![0.0; x.len()],
+            seen: vec![0.0; seen.len()],
+            impulses: DVector::zeros(impulses),
+        }
+    }
 }
 
 impl Scattering {
@@ -324,6 +335,12 @@ impl Scattered<'_> {
         }
     }
 
+    /// The next to recoil begins from what was told at poses nearby, with the twists of the same motion here.
+    pub fn begin_near(&self, told: &Told, twists: DVector<f64>) {
+        let modes = told.modes().to_vec();
+        self.kept().near = Some(Near { twists, modes });
+    }
+
     /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),
     /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side, to which `behind` is added if there is any,
     /// of the modes or of modes and twists, in the units of [`Recoiled::left`]: what was left of an earlier one, or what else the modes see.
@@ -359,7 +376,27 @@ impl Scattered<'_> {
             Goal::Relative(goal) => goal,
             Goal::Absolute(goal) => self.relative(goal, &start),
         };
-        let Solved { x, seen, impulses } = self.solve(&start, goal, seen, next);
+        let near = self.kept().near.take();
+        let Solved { x, seen, impulses } = match near {
+            None => self.solve(&start, goal, seen, next),
+            Some(Near { twists, modes }) => {
+                let (own, moved) = self.exchanged(&sums, &twists, &modes);
+                let modes = modes.iter().map(|a| unit * a);
+                let twists = twists.iter().zip(scale.iter()).map(|(t, s)| t * s);
+                let x: Vec<f64> = modes.chain(twists).collect();
+                let right = plus(&plus(&start, 1.0, &next(&own, &moved)), -1.0, &x);
+                let goal = goal * norm(&start) / norm(&right).max(f64::MIN_POSITIVE);
+                let found = match goal < 1.0 {
+                    true => self.solve(&right, goal, seen, next),
+                    false => Solved::none(&x, &own, moved.len()),
+                };
+                Solved {
+                    x: plus(&x, 1.0, &found.x),
+                    seen: plus(&own, 1.0, &found.seen),
+                    impulses: moved + found.impulses,
+                }
+            }
+        };
         let left = plus(&plus(&start, 1.0, &next(&seen, &impulses)), -1.0, &x);
         let modes = modes(&x);
         Recoiled {

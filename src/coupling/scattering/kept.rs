@@ -77,6 +77,12 @@ impl Answer {
     }
 }
 
+/// Body-frame twists and modes that are near those asked for.
+pub(super) struct Near {
+    pub twists: DVector<f64>,
+    pub modes: Vec<f64>,
+}
+
 /// All of it.
 #[derive(Default)]
 pub(super) struct Kept {
@@ -84,6 +90,8 @@ pub(super) struct Kept {
     pub report: CouplingReport,
     /// Iterations and residual of the first solve that missed its tolerance.
     pub failed: Option<(usize, f64)>,
+    /// What the first to recoil begins from.
+    pub near: Option<Near>,
     /// Why sums that are made elsewhere weren't; told once.
     pub lost: Option<Error>,
 }

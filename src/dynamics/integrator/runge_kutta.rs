@@ -99,7 +99,12 @@ fn stages<'a>(
                 at.recall(answers);
                 v.clone()
             }
-            None => readout::solve(at, &split, &p)?,
+            None => {
+                if let Some(last) = out.last() {
+                    at.begin_near(last.at(start), &last.v);
+                }
+                readout::solve(at, &split, &p)?
+            }
         };
         let chart_rate = tree.chart_rate(&xi, &v);
         let force = force(i, at, &v)?;

@@ -67,10 +67,7 @@ pub fn smallest_scaled_eigenvalue(a: &DMatrix<f64>) -> f64 {
     if a.is_empty() {
         return 1.0;
     }
-    let scale = a
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-    let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)] * scale[j]);
+    let scaled = scaled(a);
     if scaled.iter().all(|x| x.is_finite()) {
         let of = |rows: Vec<usize>| {
             let block = scaled.select_rows(&rows).select_columns(&rows);
@@ -81,6 +78,25 @@ pub fn smallest_scaled_eigenvalue(a: &DMatrix<f64>) -> f64 {
     } else {
         f64::NAN
     }
+}
+
+/// Whether [`smallest_scaled_eigenvalue`] is above `least` beyond doubt: what is left has a Cholesky factor, at a tenth of the eigenvalues' cost. False says nothing.
+pub fn is_scaled_above(a: &DMatrix<f64>, least: f64) -> bool {
+    let mut left = scaled(a);
+    // A factor is that of a matrix which differs by rounding.
+    let room = least + 8.0 * a.nrows() as f64 * f64::EPSILON;
+    for i in 0..left.nrows() {
+        left[(i, i)] -= room;
+    }
+    left.iter().all(|x| x.is_finite()) && left.cholesky().is_some()
+}
+
+/// A symmetric matrix scaled to unit diagonal; rows without a positive one become zero.
+fn scaled(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let scale = a
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)] * scale[j])
 }
 
 /// A few columns, in the layout of the caller's solver.
@@ -241,6 +257,11 @@ mod tests {
     fn smallest_eigenvalue_is_free_of_units() {
         let a = DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 1.0]);
         assert!((smallest_scaled_eigenvalue(&a) - 0.5).abs() < 1e-15);
+        assert!(is_scaled_above(&a, 0.4999) && !is_scaled_above(&a, 0.5));
+        assert!(!is_scaled_above(
+            &DMatrix::from_element(2, 2, f64::NAN),
+            0.0
+        ));
         let units = DMatrix::from_diagonal(&DVector::from_vec(vec![1e6, 1e-3]));
         assert!((smallest_scaled_eigenvalue(&(&units * a * &units)) - 0.5).abs() < 1e-15);
         assert_eq!(smallest_scaled_eigenvalue(&DMatrix::zeros(0, 0)), 1.0);

@@ -5,7 +5,7 @@ use super::shape::ContactShape;
 use super::{core_core, cylinder, cylinder_pair, plane, round_core, round_pair};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity};
 use crate::geometry::convex::Form;
-use crate::geometry::{HalfSpace, Neighbours, Other, Pairing, Region, Wall};
+use crate::geometry::{Casing, HalfSpace, Neighbours, Other, Pairing, Region, Wall};
 use crate::{Error, Result};
 
 /// Two surfaces that may come in contact.
@@ -34,8 +34,16 @@ impl ContactPair {
 pub struct Contacts {
     /// Of each body its convex pieces; of a convex one itself.
     shapes: Vec<Vec<ContactShape>>,
+    /// Boxes around the bodies.
+    casings: Vec<Option<Casing>>,
     walls: Vec<HalfSpace>,
     pairing: Pairing,
+}
+
+/// A box around all pieces of a body.
+fn casing(pieces: &[ContactShape]) -> Option<Casing> {
+    let each = pieces.iter().map(|piece| Casing::new(piece.bounds()));
+    each.reduce(Casing::joined)
 }
 
 /// Points are kept up to this part of the smaller body's radius beyond the distance asked for: what may close in a step.
@@ -51,6 +59,7 @@ impl Contacts {
         Ok(Self {
             pairing,
             walls: Wall::half_spaces(walls)?,
+            casings: shapes.iter().map(|pieces| casing(pieces)).collect(),
             shapes,
         })
     }
@@ -59,6 +68,7 @@ impl Contacts {
     pub fn with_piece(&self, b: usize, shape: ContactShape) -> Self {
         let mut out = self.clone();
         out.shapes[b] = vec![shape];
+        out.casings[b] = casing(&out.shapes[b]);
         out
     }
 
@@ -86,7 +96,8 @@ impl Contacts {
         let mut out = Vec::new();
         for (a, (own, pose)) in self.shapes.iter().zip(poses).enumerate() {
             while let Some((_, b)) = bodies.next_if(|(first, _)| *first == a) {
-                if self.pairing.has(a, b) {
+                let far = || self.apart(poses, a, b) >= reach(a) + reach(b);
+                if self.pairing.has(a, b) && !far() {
                     out.extend(self.pieces_of(a, Other::Body(b)));
                 }
             }
@@ -102,6 +113,14 @@ impl Contacts {
             }
         }
         out
+    }
+
+    /// How far apart two bodies are at least, m, as boxes around them tell.
+    fn apart(&self, poses: &[Pose], a: usize, b: usize) -> f64 {
+        match (&self.casings[a], &self.casings[b]) {
+            (Some(own), Some(other)) => own.apart_at(&poses[a], other, &poses[b]),
+            _ => 0.0,
+        }
     }
 
     /// Whether any of the bodies that `inside` names may come in contact with a wall or with one that it doesn't.

@@ -5,7 +5,7 @@ use super::recoil::Recoiling;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
 use crate::adjoint::rigid;
-use crate::adjoint::solve::{Definite, smallest_scaled_eigenvalue};
+use crate::adjoint::solve::{Definite, is_scaled_above, smallest_scaled_eigenvalue};
 use crate::multibody::Articulated;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -193,13 +193,17 @@ impl<'a> Evaluation<'a> {
         self.mass_matrix();
         self.check()?;
         let block = self.mass_matrix().select_rows(free).select_columns(free);
-        let smallest = smallest_scaled_eigenvalue(&block);
-        let refused = || unresolved(self.weakest(free), smallest);
-        if smallest.is_nan() || smallest <= LEAST {
-            return Err(refused());
+        let refused = |smallest| unresolved(self.weakest(free), smallest);
+        if !is_scaled_above(&block, LEAST) {
+            let smallest = smallest_scaled_eigenvalue(&block);
+            if smallest.is_nan() || smallest <= LEAST {
+                return Err(refused(smallest));
+            }
         }
-        let factor = Definite::new(block).ok_or_else(refused)?;
-        Ok(Inertia::Dense(factor, free.to_vec()))
+        match Definite::new(block.clone()) {
+            Some(factor) => Ok(Inertia::Dense(factor, free.to_vec())),
+            None => Err(refused(smallest_scaled_eigenvalue(&block))),
+        }
     }
 
     /// Where the velocities `free` have least inertia, in words.

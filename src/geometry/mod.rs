@@ -17,6 +17,7 @@
 mod beneath;
 mod boxes;
 mod broad;
+mod casing;
 mod check;
 pub(crate) mod convex;
 mod exact;
@@ -44,6 +45,7 @@ pub(crate) mod weld;
 
 pub(crate) use beneath::Beneath;
 pub(crate) use broad::{Neighbours, Region};
+pub(crate) use casing::Casing;
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
 pub(crate) use convex::Field;
 pub use convex::Solid;

@@ -1,5 +1,6 @@
 //! What lies opposite a surface: how far a point is from it, with two derivatives.
 
+use super::casing::Casing;
 use super::convex::{Field, Form, Solid};
 use super::mesh::TriMesh;
 use super::tree::MeshTree;
@@ -36,6 +37,15 @@ impl Opposite {
     /// Whether it is known to be convex: a shape by formula, or a wall.
     pub fn is_convex(&self) -> bool {
         !matches!(self.0, Kind::Mesh(_))
+    }
+
+    /// A box around it, if it is a body.
+    pub fn casing(&self) -> Option<Casing> {
+        match &self.0 {
+            Kind::Solid(solid) => Some(Casing::new(solid.bounds())),
+            Kind::Mesh(tree) => Some(tree.casing()),
+            Kind::Wall(_) => None,
+        }
     }
 
     /// The wall's normal, if it is one.

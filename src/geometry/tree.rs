@@ -1,6 +1,7 @@
 //! One mesh, ready to be asked for closest points: its faces in a tree of boxes, and its normals.
 
 use super::boxes::{Node, tree};
+use super::casing::Casing;
 use super::mesh::TriMesh;
 use super::points::{Ball, winding_number};
 use super::topology;
@@ -98,6 +99,18 @@ impl MeshTree {
         let best = self.nearest(p, stop);
         (best.square > stop && best.square.is_finite() && self.inside(p, &best))
             .then(|| best.square.sqrt())
+    }
+
+    /// A box around the mesh.
+    pub fn casing(&self) -> Casing {
+        let Node { center, half, .. } = &self.nodes[0];
+        Casing::new([center - half, center + half])
+    }
+
+    /// Whether a ball may reach into the box around the mesh; what isn't a number may.
+    pub fn meets_box(&self, center: &Vec3, radius: f64) -> bool {
+        let out = self.nodes[0].distance_squared(center);
+        !(out > radius * radius * (1.0 + 1e-12) && center.iter().all(|x| x.is_finite()))
     }
 
     /// Whether a point lies in the box around the mesh.

@@ -10,6 +10,7 @@ use crate::error::readable;
 use crate::geometry::Gap;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
@@ -122,17 +123,12 @@ impl Rollout {
 
     /// Smallest gap between bodies or to a wall at states 0 … N; none where there is nothing to
     /// meet. Pairs that never move relative to one another, and those declared to overlap, don't
-    /// count. With the fidelity `isolated`, where gaps have no effect, they are measured at the
-    /// first call.
+    /// count. They are measured at the first call.
     pub fn gaps(&self) -> &[Option<Gap>] {
         self.gaps.get_or_init(|| {
-            let samples = self.samples().iter();
-            match self.simulator.fidelity_acting().coupled() {
-                false => samples
-                    .map(|s| self.simulator.gaps().smallest(&s.poses))
-                    .collect(),
-                true => samples.map(|s| s.gap).collect(),
-            }
+            let samples = self.samples().par_iter();
+            let gaps = samples.map(|s| self.simulator.gaps().smallest(&s.poses));
+            gaps.collect()
         })
     }
 
@@ -165,8 +161,10 @@ impl Rollout {
     /// meshes don't resolve, and bodies in one another with the fidelity `isolated`; drag too stiff for an explicit integrator's step, and
     /// energy that comes from nowhere.
     pub fn warnings(&self) -> Vec<String> {
-        let samples = self.samples().iter();
-        let states = samples.filter_map(|s| Some((s.time, s.poses.as_slice(), s.gap?)));
+        // Where bodies don't feel each other nothing is to be resolved.
+        let coupled = self.simulator.fidelity_acting().coupled();
+        let states = self.samples().iter().zip(self.gaps()).filter(|_| coupled);
+        let states = states.filter_map(|(s, gap)| Some((s.time, s.poses.as_slice(), (*gap)?)));
         let smallest = self.nearest().map(|(n, gap)| (self.samples()[n].time, gap));
         let warning = self.simulator.gap_warning(smallest, states);
         let all = (warning.into_iter())

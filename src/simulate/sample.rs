@@ -4,7 +4,6 @@ use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::CouplingReport;
 use crate::dynamics::Parameters;
 use crate::dynamics::force::Place;
-use crate::geometry::Gap;
 use nalgebra::DVector;
 
 /// What is observed at one state.
@@ -34,8 +33,6 @@ pub struct Sample {
     pub hold: Vec<bool>,
     /// What the coupling reports.
     pub report: CouplingReport,
-    /// Smallest gap; for [`Rollout::gaps`].
-    pub(super) gap: Option<Gap>,
 }
 
 impl Sample {

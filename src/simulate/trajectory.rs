@@ -9,7 +9,6 @@ use crate::dynamics::{
     Evaluation, Input, Linearisation, LinearisedStep, Parameters, State, StateBar, StepBar,
     StepRecord, Stepper,
 };
-use crate::geometry::Gap;
 use crate::multibody::{Cotangents, Virtual};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -59,17 +58,17 @@ impl Simulator {
 }
 
 impl<'a> Trajectory<'a> {
-    /// The smallest gap at a state, whose bodies must keep apart; not asked for where it has no effect.
-    fn gap(&self, state: &State) -> Result<Option<Gap>> {
+    /// Refuses a state that isn't finite, or whose bodies don't keep apart where that has an effect.
+    fn check(&self, state: &State) -> Result<()> {
         finite::state(&self.simulator.scene, state)?;
         if !self.simulator.fidelity_acting().coupled() {
-            return Ok(None);
+            return Ok(());
         }
         let poses = self.stepper.system.tree.kinematics(&state.q).poses;
         self.simulator.clearance().keep_apart(&poses)
     }
 
-    fn observe(&self, e: &Evaluation, state: &State, gap: Option<Gap>) -> Result<Sample> {
+    fn observe(&self, e: &Evaluation, state: &State) -> Result<Sample> {
         let v = self.stepper.velocity(e, state)?;
         let momenta = e.momenta(&v);
         let sample = Sample {
@@ -82,7 +81,6 @@ impl<'a> Trajectory<'a> {
             kept_momentum: (self.simulator.kept().velocities).tr_mul(&e.frame_momentum(&v)),
             poses: e.kinematics.poses.clone(),
             report: e.report().clone(),
-            gap,
             control: DVector::zeros(0),
             hold: Vec::new(),
             v,
@@ -179,9 +177,9 @@ impl<'a> Trajectory<'a> {
         decide: impl FnOnce(&Sample) -> Result<DVector<f64>>,
     ) -> Result<(State, Sample, StepRecord)> {
         let run = || {
-            let gap = self.gap(state)?;
+            self.check(state)?;
             let e = self.stepper.linearise(&state.q, self.stepper.time(state))?;
-            let mut sample = self.observe(&e, state, gap)?;
+            let mut sample = self.observe(&e, state)?;
             let control = decide(&sample)?;
             let (input, mode) = self.input(control, index, state, &sample)?;
             let step = self.stepper.step(&e, state, &sample.v, &input);
@@ -350,9 +348,9 @@ impl Step for Trajectory<'_> {
 
     fn last(&self, _index: usize, state: &State) -> Result<Sample> {
         let run = || {
-            let gap = self.gap(state)?;
+            self.check(state)?;
             let e = self.stepper.evaluate(&state.q, self.stepper.time(state))?;
-            self.observe(&e, state, gap)
+            self.observe(&e, state)
         };
         run().map_err(|e: Error| self.explain(e, state))
     }

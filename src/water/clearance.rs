@@ -3,7 +3,7 @@
 use super::fidelity::Fidelity;
 use super::gap_error::GapError;
 use super::resolved::{Resolved, narrowest};
-use super::surface::{Surface, overlaps, touches};
+use super::surface::{Surface, overlaps, touches, touching};
 use crate::adjoint::lie::Pose;
 use crate::error::readable;
 use crate::geometry::{Gap, Gaps, Other, Pairing, Share, overlap_error};
@@ -180,9 +180,13 @@ impl Clearance {
         }
     }
 
-    /// The smallest gap at these poses; stops a run when bodies get into one another or into a wall.
-    pub fn keep_apart(&self, poses: &[Pose]) -> Result<Option<Gap>> {
-        let smallest = self.moving.smallest(poses);
+    /// Stops a run when bodies get into one another or into a wall.
+    pub fn keep_apart(&self, poses: &[Pose]) -> Result<()> {
+        // Of gaps that aren't as small nothing is asked here.
+        let touching = self
+            .moving
+            .within(poses, touching(self.moving.longest_edge()));
+        let smallest = (touching.into_iter()).min_by(|a, b| a.distance.total_cmp(&b.distance));
         if let Some(gap) = smallest.as_ref().filter(|gap| overlaps(gap)) {
             return Err(Error::Unresolved {
                 place: self.place(gap),
@@ -194,8 +198,7 @@ impl Clearance {
         }
         self.refuse_film(poses)?;
         self.refuse_touch(smallest.as_ref())?;
-        self.refuse_depth(poses)?;
-        Ok(smallest)
+        self.refuse_depth(poses)
     }
 
     /// What to do about bodies that get into one another by `depth`, m.

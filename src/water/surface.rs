@@ -139,9 +139,14 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
 /// Depth in edges up to which surfaces count as touching, and distance from which they don't: rounding.
 const TOUCHING: f64 = 1e-9;
 
+/// The gap under which surfaces with edges of this length touch, m.
+pub(crate) fn touching(edge: f64) -> f64 {
+    TOUCHING * edge
+}
+
 /// Whether surfaces touch, or cross.
 pub(crate) fn touches(gap: &Gap) -> bool {
-    gap.distance < TOUCHING * gap.edge
+    gap.distance < touching(gap.edge)
 }
 
 /// Whether surfaces cross.

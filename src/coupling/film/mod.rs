@@ -37,7 +37,8 @@ pub(crate) use set::{FilmBody, Films, MovingFilms, PlacedFilms};
 pub(crate) use surface::{Cluster, FilmSurface, clusters};
 pub(crate) use water::Beside;
 
-use crate::geometry::{Image, Opposite, Other};
+use crate::adjoint::lie::Pose;
+use crate::geometry::{Casing, Image, Opposite, Other};
 use crate::solver::SparsePattern;
 use std::sync::{Arc, Mutex};
 use surface::Element;
@@ -93,6 +94,8 @@ pub(crate) struct Film {
     pub other: Side,
     pub surface: Arc<FilmSurface>,
     pub opposite: Arc<Opposite>,
+    /// A box around the body that is opposite.
+    casing: Option<Casing>,
     pub width: Width,
     /// Distances between which the flow in it goes over into that around the bodies, m.
     rim: [f64; 2],
@@ -121,6 +124,7 @@ impl Film {
             body,
             other,
             surface,
+            casing: opposite.casing(),
             opposite,
             width: Width {
                 floor: shares.floor * reach,
@@ -128,6 +132,17 @@ impl Film {
             },
             rim,
             pattern: Arc::default(),
+        }
+    }
+
+    /// Whether boxes tell that the gap is wider than the film reaches.
+    fn is_far(&self, poses: &[Pose]) -> bool {
+        match (self.other, &self.casing) {
+            (Side::Body(b), Some(casing)) => {
+                let own = &self.surface.casing;
+                own.apart_at(&poses[self.body], casing, &poses[b]) > self.width.reach
+            }
+            _ => false,
         }
     }
 

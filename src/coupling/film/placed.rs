@@ -57,6 +57,9 @@ pub(crate) struct MovingFilm<'a> {
 impl<'a> PlacedFilm<'a> {
     /// For a basis of body-frame twists. None where the gap is wide. `Err`: a distance that isn't positive, or 0 where the film has no solution.
     pub fn new(film: &'a Film, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<Self>, f64> {
+        if film.is_far(poses) {
+            return Ok(None);
+        }
         let frame = match film.other {
             Side::Body(b) => poses[b],
             Side::Wall(_) => Pose::identity(),

@@ -167,6 +167,10 @@ impl Films {
             let placed = PlacedFilm::new(film, poses, basis);
             placed.map_err(|distance| touching(film, distance, names))
         };
+        // Where all are far nobody needs to be woken.
+        if self.0.iter().all(|film| film.is_far(poses)) {
+            return Ok(PlacedFilms(self.0.iter().map(|_| None).collect()));
+        }
         Ok(PlacedFilms(in_order(self.0.par_iter().map(place))?))
     }
 

@@ -1,7 +1,7 @@
 //! The side of a film that its potential is solved on.
 
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
-use crate::geometry::TriMesh;
+use crate::geometry::{Casing, TriMesh, bounds};
 use crate::solver::elimination_order;
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
@@ -29,6 +29,8 @@ pub(crate) struct FilmSurface {
     /// A ball around the vertices.
     pub center: Vec3,
     pub radius: f64,
+    /// A box around them.
+    pub casing: Casing,
     pub clusters: Vec<Cluster>,
     /// The vertices in an order of elimination, of all systems on some of them.
     pub order: Vec<usize>,
@@ -115,6 +117,7 @@ impl FilmSurface {
             size,
             center: ball.center,
             radius: ball.radius,
+            casing: Casing::new(bounds(mesh.vertices().iter())),
             clusters: clusters(mesh.vertices()),
             order,
         }

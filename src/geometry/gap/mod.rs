@@ -14,9 +14,11 @@ mod nearest;
 mod pair;
 
 use crate::error::{Error, Result};
+use crate::geometry::casing::Casing;
 use crate::geometry::convex::Solid;
 use crate::geometry::mesh::TriMesh;
 use crate::geometry::pairing::Pairing;
+use crate::geometry::points::{Ball, bounds};
 use crate::geometry::tree::MeshTree;
 use crate::geometry::wall::{HalfSpace, Wall};
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -89,6 +91,8 @@ pub struct Gaps {
     trees: Vec<Option<Arc<MeshTree>>>,
     /// What the meshes stand for, of bodies by formula.
     solids: Vec<Option<Solid>>,
+    /// Boxes around the bodies.
+    casings: Vec<Option<Casing>>,
     walls: Vec<HalfSpace>,
     pairing: Pairing,
     /// No edge of a mesh is longer in the mean around a corner, m.
@@ -120,6 +124,7 @@ impl Gaps {
         Ok(Self {
             longest: longest.fold(0.0, f64::max),
             solids: vec![None; count],
+            casings: trees.iter().map(|t| Some(t.as_ref()?.casing())).collect(),
             trees,
             walls: Wall::half_spaces(walls)?,
             pairing: Pairing::all(count).but(ignore.iter().copied()),
@@ -150,6 +155,11 @@ impl Gaps {
                 solids.len(),
                 format!("give one, or none, for each of {} meshes", self.trees.len()),
             ));
+        }
+        for (casing, solid) in self.casings.iter_mut().zip(&solids) {
+            if let Some(solid) = solid {
+                *casing = Some(Casing::new(solid.bounds()));
+            }
         }
         self.solids = solids;
         Ok(self)
@@ -315,6 +325,27 @@ pub struct Share {
     /// Points of the inner body, in its frame, with their parts of its volume: cones from the
     /// centroid to the faces, negative where the body isn't seen from there.
     samples: Vec<(Vec3, f64)>,
+    /// Balls around points that lie together, with the positive parts of each.
+    clusters: Vec<(Ball, f64)>,
+}
+
+/// Points of a cluster at most.
+const CLUSTER: usize = 48;
+
+/// Balls around samples that lie together, with their positive parts.
+fn clusters(samples: &mut [(Vec3, f64)], out: &mut Vec<(Ball, f64)>) {
+    if samples.len() <= CLUSTER {
+        let part = samples.iter().map(|(_, part)| part.max(0.0)).sum();
+        let ball = Ball::around(samples.iter().map(|(x, _)| x));
+        out.push((ball, part));
+        return;
+    }
+    let [low, high] = bounds(samples.iter().map(|(x, _)| x));
+    let (axis, half) = ((high - low).imax(), samples.len() / 2);
+    samples.select_nth_unstable_by(half, |(x, _), (y, _)| x[axis].total_cmp(&y[axis]));
+    let (left, right) = samples.split_at_mut(half);
+    clusters(left, out);
+    clusters(right, out);
 }
 
 impl Share {
@@ -340,11 +371,15 @@ impl Share {
                 (apex + center * out, part)
             })
         });
+        let samples: Vec<(Vec3, f64)> = cones.collect();
+        let mut together = Vec::new();
+        clusters(&mut samples.clone(), &mut together);
         Some(Self {
             inner,
             outer,
             tree: MeshTree::new(large),
-            samples: cones.collect(),
+            samples,
+            clusters: together,
         })
     }
 
@@ -366,6 +401,12 @@ impl Share {
     pub fn above(&self, poses: &[Pose], limit: f64) -> Option<f64> {
         let (inner, outer) = (&poses[self.inner], &poses[self.outer]);
         let there = |x: &Vec3| outer.apply_inverse(&inner.apply(x));
+        let may = |ball: &Ball| self.tree.meets_box(&there(&ball.center), ball.radius);
+        let may = self.clusters.iter().filter(|(ball, _)| may(ball));
+        // What isn't a number may be anywhere.
+        if may.map(|(_, part)| part).sum::<f64>() <= limit {
+            return None;
+        }
         let near = self.samples.iter().map(|(x, part)| (there(x), *part));
         let near: Vec<(Vec3, f64)> = near.filter(|(x, _)| self.tree.in_box(x)).collect();
         let most: f64 = near.iter().map(|(_, part)| part.max(0.0)).sum();

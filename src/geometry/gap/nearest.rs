@@ -25,7 +25,7 @@ impl Gaps {
         // Pairs up to a distance at a time, each time farther: the nearest first by the balls around them.
         let (mut from, mut to) = (f64::NEG_INFINITY, mean_radius(&balls));
         loop {
-            let mut waiting = self.candidates(&balls, to);
+            let mut waiting = self.candidates(poses, &balls, to);
             waiting.retain(|c| c.bound >= from);
             waiting.sort_by(|a, b| a.bound.total_cmp(&b.bound).then(a.pair.cmp(&b.pair)));
             for Candidate { bound, pair } in waiting {
@@ -46,7 +46,8 @@ impl Gaps {
 
     /// The gaps below `distance` (m), in the order of [`Gaps::all`].
     pub fn within(&self, poses: &[Pose], distance: f64) -> Vec<Gap> {
-        let near = self.candidates(&self.balls(poses), distance).into_iter();
+        let near = self.candidates(poses, &self.balls(poses), distance);
+        let near = near.into_iter();
         near.filter_map(|c| self.gap(c.pair, poses, f64::INFINITY))
             .filter(|gap| gap.distance < distance)
             .collect()
@@ -63,7 +64,7 @@ impl Gaps {
     }
 
     /// The pairs that may be nearer than `distance` (m), in the order of [`Gaps::pairs`].
-    fn candidates(&self, balls: &[Option<Ball>], distance: f64) -> Vec<Candidate> {
+    fn candidates(&self, poses: &[Pose], balls: &[Option<Ball>], distance: f64) -> Vec<Candidate> {
         let region = |ball: &Option<Ball>| Some(Region::around(ball.as_ref()?, 0.5 * distance));
         let near = Neighbours::new(balls.iter().map(region).collect());
         let mut bodies = near.pairs().peekable();
@@ -74,13 +75,26 @@ impl Gaps {
             let others = own.map(|(_, j)| Other::Body(j));
             let walls = (0..self.walls.len()).map(Other::Wall);
             for pair in others.chain(walls).map(|other| (i, other)) {
-                if let Some(bound) = self.bound(balls, pair).filter(|b| *b < distance) {
-                    let bound = bound.max(0.0);
+                let bound = self.bound(balls, pair).filter(|b| *b < distance);
+                let bound = bound.map(|b| b.max(self.apart(poses, pair)));
+                if let Some(bound) = bound.filter(|b| *b < distance) {
                     out.push(Candidate { bound, pair });
                 }
             }
         }
         out
+    }
+
+    /// A lower bound of a gap, from boxes around the bodies; not negative.
+    fn apart(&self, poses: &[Pose], (i, other): (usize, Other)) -> f64 {
+        let Other::Body(j) = other else {
+            return 0.0;
+        };
+        let casing = |b: usize| Some((self.casings.get(b)?.as_ref()?, poses.get(b)?));
+        match (casing(i), casing(j)) {
+            (Some((a, at)), Some((b, there))) => a.apart_at(at, b, there),
+            _ => 0.0,
+        }
     }
 
     /// A lower bound of a gap, from balls around the bodies.

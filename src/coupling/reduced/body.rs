@@ -20,6 +20,8 @@ pub struct ReducedBody {
     basis: DMatrix<f64>,
     /// The points as targets of the potential kernel.
     targets: Points,
+    /// [`ReducedBody::deficit`].
+    deficit: f64,
 }
 
 /// What a compressed body consists of.
@@ -122,6 +124,7 @@ impl ReducedBody {
         basis.columns_mut(m, 6).copy_from(&parts.strengths);
         Ok(Self {
             targets: Points::bare(&parts.points),
+            deficit: deficit(&parts),
             basis,
             parts,
         })
@@ -180,6 +183,32 @@ impl ReducedBody {
 
     pub(super) fn targets(&self) -> &Points {
         &self.targets
+    }
+
+    /// Volume of the water that the body moves, m³, and the reach of its turns, m.
+    pub(super) fn scales(&self) -> (f64, f64) {
+        scales(&self.parts)
+    }
+
+    /// What the body's own added mass is below zero by, scaled by the water displaced: the one-body method's
+    /// error in a spin that moves no water, and no matter of gaps.
+    pub(super) fn deficit(&self) -> f64 {
+        self.deficit
+    }
+}
+
+fn scales(p: &CompressedParts) -> (f64, f64) {
+    let linear = p.added_mass.fixed_view::<3, 3>(0, 0).trace();
+    (p.volume.max(linear), p.radius + p.centre.norm())
+}
+
+fn deficit(p: &CompressedParts) -> f64 {
+    let (mass, arm) = scales(p);
+    let scale = |i: usize| mass.sqrt() * if i < 3 { 1.0 } else { arm };
+    let scaled = Mat6::from_fn(|i, j| p.added_mass[(i, j)] / (scale(i) * scale(j)));
+    match scaled.iter().all(|x| x.is_finite()) {
+        true => (-scaled.symmetric_eigenvalues().min()).max(0.0),
+        false => 0.0,
     }
 }
 

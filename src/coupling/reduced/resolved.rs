@@ -1,7 +1,7 @@
 //! What an evaluation must not have come to, whatever computed it.
 
-use super::{CompressedParts, Reduced};
-use crate::adjoint::lie::{Mat6, Pose, Vec3};
+use super::Reduced;
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 
@@ -82,21 +82,6 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
     }
 }
 
-/// Volume of the water that a body moves, m³, and the reach of its turns, m.
-fn scales(p: &CompressedParts) -> (f64, f64) {
-    let linear = p.added_mass.fixed_view::<3, 3>(0, 0).trace();
-    (p.volume.max(linear), p.radius + p.centre.norm())
-}
-
-/// What a body's own added mass is below zero by, scaled by the water displaced: the one-body method's
-/// error in a spin that moves no water, and no matter of gaps.
-fn deficit(p: &CompressedParts) -> f64 {
-    let (mass, arm) = scales(p);
-    let scale = |i: usize| mass.sqrt() * if i < 3 { 1.0 } else { arm };
-    let scaled = Mat6::from_fn(|i, j| p.added_mass[(i, j)] / (scale(i) * scale(j)));
-    (-scaled.symmetric_eigenvalues().min()).max(0.0)
-}
-
 /// The energy of the basis must not be negative beyond rounding.
 fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>) -> Result<()> {
     let mut energy = basis.tr_mul(momenta);
@@ -106,7 +91,7 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         .map(|i| {
             let bodies = reduced.bodies.iter().enumerate();
             let inertia = bodies.map(|(b, body)| {
-                let (mass, arm) = scales(body.parts());
+                let (mass, arm) = body.scales();
                 let twist = basis.fixed_view::<6, 1>(6 * b, i);
                 let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
                 let scale = u.norm() + arm * w.norm();
@@ -115,7 +100,7 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
             inertia.sum::<f64>()
         })
         .collect();
-    let bodies = reduced.bodies.iter().map(|b| deficit(b.parts()));
+    let bodies = reduced.bodies.iter().map(|b| b.deficit());
     let rounding = ROUNDING + 2.0 * bodies.fold(0.0, f64::max);
     for i in 0..k {
         if own[i] > 0.0 {

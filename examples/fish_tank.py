@@ -30,7 +30,6 @@ import numpy as np
 import hydrograd as hg
 import tables
 
-DEFAULT = pathlib.Path(__file__).parents[2] / "shared/data/fish"
 TRAIN = ["f1_00", "f1_75"]
 BEAT = 0.75  # beats per turn that the motor is said to make, about
 DENSITY = 1000.0
@@ -541,7 +540,7 @@ def tell(report):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--data", type=pathlib.Path, help=f"folder of tracks; default: {DEFAULT.parent.name}/{DEFAULT.name} where that is, else tracks made here")
+    parser.add_argument("--data", type=pathlib.Path, help="folder of tracks; default: tracks made here")
     parser.add_argument("--train", nargs=2, default=TRAIN, metavar="NAME", help="training films (%(default)s)")
     parser.add_argument("--drive", choices=("angles", "tendons", "both"), default="both", help="how the tail is moved (%(default)s)")
     parser.add_argument("--make", type=pathlib.Path, metavar="FOLDER", help="only write tracks made here to a folder")
@@ -558,7 +557,7 @@ def main():
         if options.make:
             make(options.make, options.quick)
             return
-        path = options.data or (DEFAULT if DEFAULT.is_dir() and not options.quick else None)
+        path = options.data
         if path:
             report = evaluate(path, options.train, drives, say, False)
         else:

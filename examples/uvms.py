@@ -30,7 +30,6 @@ import numpy as np
 import hydrograd as hg
 import tables
 
-DEFAULT = pathlib.Path(__file__).parents[2] / "shared/data/uvms"
 TRAIN = ["004-0", "006-1", "014-1", "030-1", "alt-001-2"]
 LIVELY = ["014-1", "020-0", "005-2", "015-1"]
 DENSITY, GRAVITY = 997.0, 9.81  # kg/m³, m/s²
@@ -617,7 +616,7 @@ def constants(path):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--data", type=pathlib.Path, help=f"folder of recordings; default: {DEFAULT.parent.name}/{DEFAULT.name} where that is, else recordings made here")
+    parser.add_argument("--data", type=pathlib.Path, help="folder of recordings; default: recordings made here")
     parser.add_argument("--train", nargs="+", default=TRAIN, metavar="NAME", help="training runs (%(default)s)")
     parser.add_argument("--constants", type=pathlib.Path, metavar="FILE", help="take them from an earlier --json instead of identifying them")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="read these runs alone")
@@ -639,7 +638,7 @@ def main():
             return
         given = constants(options.constants) if options.constants else None
         with_coupling = not (options.no_coupling or options.quick or options.only)
-        path = options.data or (DEFAULT if DEFAULT.is_dir() and not options.quick else None)
+        path = options.data
         if path:
             report, runs, models = evaluate(path, options.train, options.only, given, with_coupling, say, False)
         else:

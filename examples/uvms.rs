@@ -305,8 +305,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => return Err(format!("{name}: expected --data, --rival or --json").into()),
         }
     }
-    let own = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/uvms");
-    let data = data.or(own.is_dir().then_some(own));
     let made = match &data {
         Some(_) => None,
         None => Some(tempfile::tempdir()?),

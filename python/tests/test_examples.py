@@ -3,6 +3,7 @@
 import importlib
 import json
 import math
+import os
 import pathlib
 import re
 import subprocess
@@ -155,7 +156,8 @@ def test_rov(tmp_path):
     assert mpc["plans"] == learning["plans"] == 50 and mpc["plans_failed"] == learning["plans_failed"] == 0
 
 
-TANKS = ROOT.parent / "shared/data"
+# Recordings of the tanks, where a folder with them is given.
+TANKS = pathlib.Path(os.environ.get("HYDROGRAD_RECORDINGS", "recordings"))
 
 
 def refused(name, *options):

@@ -23,8 +23,8 @@ ROBOTS = {
 FIXED = {"so101": 0.48501, "panda": 16.82213, "ur5_gripper": 16.99390, "borinot_flying_arm_2": 0.26354, "quadruped": 0.77200}
 GRAVITY = np.array([0.3, -0.2, -9.81])
 STATES = 100
-# Vehicles with an arm, where they are: a folder beside the repository's, or one that is named.
-UVMS = pathlib.Path(os.environ.get("HYDROGRAD_UVMS", ROOT.parent / "shared" / "data" / "uvms"))
+# Vehicles with an arm, where a folder of recordings is given.
+UVMS = pathlib.Path(os.environ.get("HYDROGRAD_RECORDINGS", "recordings")) / "uvms"
 
 
 def published(name):

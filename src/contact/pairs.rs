@@ -96,7 +96,8 @@ impl Contacts {
         let mut out = Vec::new();
         for (a, (own, pose)) in self.shapes.iter().zip(poses).enumerate() {
             while let Some((_, b)) = bodies.next_if(|(first, _)| *first == a) {
-                let far = || self.apart(poses, a, b) >= reach(a) + reach(b);
+                let apart = |a, b| Some(self.apart(poses, a, b)).filter(|apart| *apart > 0.0);
+                let far = || apart(a, b).is_some_and(|apart| apart >= reach(a) + reach(b));
                 if self.pairing.has(a, b) && !far() {
                     out.extend(self.pieces_of(a, Other::Body(b)));
                 }

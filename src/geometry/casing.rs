@@ -35,6 +35,10 @@ impl Casing {
     pub fn apart(&self, other: &Self, there: &Pose) -> f64 {
         let turn = &there.rotation;
         let way = there.apply(&other.center) - self.center;
+        // What isn't a number isn't apart.
+        if !way.iter().chain(turn.iter()).all(|x| x.is_finite()) {
+            return 0.0;
+        }
         let room = ROUNDING * (way.amax() + self.half.amax() + other.half.amax());
         let back = turn.tr_mul(&way);
         let mut most: f64 = 0.0;
@@ -46,7 +50,6 @@ impl Casing {
             }
             most = most.max(way[i].abs() - own).max(back[i].abs() - others);
         }
-        // What isn't a number isn't apart.
         (most - room).max(0.0)
     }
 

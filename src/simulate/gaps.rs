@@ -11,7 +11,11 @@ impl Rollout {
     /// went. Without estimates with the fidelity `isolated`, by fundamental solutions, and where there is no water. Nothing is solved for it; gaps are
     /// looked through at the first call.
     pub fn gap_report(&self) -> GapReport {
-        self.report.get_or_init(|| self.made_report()).clone()
+        if self.report.get().is_none() {
+            // Another thread's is the same.
+            let _ = self.report.set(self.made_report());
+        }
+        self.report.get().cloned().unwrap_or_default()
     }
 
     fn made_report(&self) -> GapReport {

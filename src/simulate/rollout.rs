@@ -125,11 +125,14 @@ impl Rollout {
     /// meet. Pairs that never move relative to one another, and those declared to overlap, don't
     /// count. They are measured at the first call.
     pub fn gaps(&self) -> &[Option<Gap>] {
-        self.gaps.get_or_init(|| {
-            let samples = self.samples().par_iter();
-            let gaps = samples.map(|s| self.simulator.gaps().smallest(&s.poses));
-            gaps.collect()
-        })
+        if let Some(made) = self.gaps.get() {
+            return made;
+        }
+        // Not while others wait: a thread that measures may be asked for them meanwhile. Whoever else made them made the same.
+        let samples = self.samples().par_iter();
+        let gaps = samples.map(|s| self.simulator.gaps().smallest(&s.poses));
+        let made = gaps.collect();
+        self.gaps.get_or_init(|| made)
     }
 
     /// Number of pieces in which each step was made: one where it wasn't cut ([`Stepper::step`](crate::dynamics::Stepper::step)).

@@ -9,7 +9,7 @@ use hydrograd::coupling::scattering::{Goal, Levels, Motions, Scattering};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;
 use hydrograd::geometry::Image;
-use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape, Wall, WallSurface};
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::Exchange;
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::{DMatrix, DVector};
@@ -556,6 +556,41 @@ fn chains_with_driven_joints_and_excluded_pairs_agree() {
     let error = (&found - &right).norm() / right.norm();
     println!("velocities of driven chains differ by {error:.1e}");
     assert!(error < 1e-3);
+}
+
+/// Stages begin from the stage before: which is nothing at rest, and far more than what is asked for where all turn back at once.
+#[test]
+fn what_rests_and_what_turns_back_is_solved() {
+    let still = |scene: &mut Scene| scene.initial.v.iter_mut().for_each(|v| *v = 0.0);
+    for integrator in [Integrator::Rk2, Integrator::Rk4] {
+        let mut scene = swarm(8, 0.6, 1100.0);
+        still(&mut scene);
+        let simulator = Simulator::new(&scene, settings(Exchange::Products, integrator)).unwrap();
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 2)).unwrap();
+        assert!(rollout.v().iter().all(|v| *v == 0.0));
+        let gradient = rollout.gradient(&objective::final_velocity(0, -0.5, 1.0));
+        let slope = gradient.unwrap().initial.v[0];
+        assert!((slope - 1.0).abs() < 1e-9, "{slope}");
+        // A quarter of the period is a step: the last stage of RK4 is where all velocities vanish.
+        let mut scene = swarm(8, 0.6, 1100.0);
+        still(&mut scene);
+        for body in &mut scene.bodies {
+            body.joint = Joint::Prismatic {
+                axis: [0.0, 0.0, 1.0],
+            };
+            body.motion = Some(vec![Motion::Sine {
+                amplitude: 0.005,
+                frequency: 25.0,
+                phase: 0.0,
+                offset: 0.0,
+            }]);
+        }
+        scene.initial.v.clear();
+        let simulator = Simulator::new(&scene, settings(Exchange::Products, integrator)).unwrap();
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 4)).unwrap();
+        let most = rollout.samples()[1].v.amax();
+        assert!(most < 1e-12, "{most}");
+    }
 }
 
 #[test]

@@ -377,15 +377,20 @@ impl Scattered<'_> {
             Goal::Absolute(goal) => self.relative(goal, &start),
         };
         let near = self.kept().near.take();
+        let near = near.and_then(|Near { twists, modes }| {
+            let (own, moved) = self.exchanged(&sums, &twists, &modes);
+            let modes = modes.iter().map(|a| unit * a);
+            let twists = twists.iter().zip(scale.iter()).map(|(t, s)| t * s);
+            let x: Vec<f64> = modes.chain(twists).collect();
+            let right = plus(&plus(&start, 1.0, &next(&own, &moved)), -1.0, &x);
+            // No nearer than nothing is of no use; nor is what isn't a number.
+            let nearer = norm(&right) < norm(&start);
+            nearer.then_some((x, own, moved, right))
+        });
         let Solved { x, seen, impulses } = match near {
             None => self.solve(&start, goal, seen, next),
-            Some(Near { twists, modes }) => {
-                let (own, moved) = self.exchanged(&sums, &twists, &modes);
-                let modes = modes.iter().map(|a| unit * a);
-                let twists = twists.iter().zip(scale.iter()).map(|(t, s)| t * s);
-                let x: Vec<f64> = modes.chain(twists).collect();
-                let right = plus(&plus(&start, 1.0, &next(&own, &moved)), -1.0, &x);
-                let goal = goal * norm(&start) / norm(&right).max(f64::MIN_POSITIVE);
+            Some((x, own, moved, right)) => {
+                let goal = goal * norm(&start) / norm(&right);
                 let found = match goal < 1.0 {
                     true => self.solve(&right, goal, seen, next),
                     false => Solved::none(&x, &own, moved.len()),

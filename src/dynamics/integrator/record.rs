@@ -14,7 +14,7 @@ use crate::dynamics::answers::Answers;
 use crate::dynamics::{Evaluation, InputTangents, Linearisation};
 use nalgebra::{DMatrix, DVector};
 
-/// What a step leaves behind: where it started, what acted, how it was made, and its converged stages. It is small, and the only
+/// What a step leaves behind: where it started, what acted, how it was made, and its converged stages; of many bodies that are coupled by products what the water answered, too. It is the only
 /// key to the step's derivatives ([`Stepper::linearise_step`]), which needn't iterate again.
 #[derive(Clone, Debug)]
 pub struct StepRecord {

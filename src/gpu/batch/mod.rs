@@ -6,7 +6,7 @@
 //! Points and charges stay on the device in a *slot* of their scene, so that what derivatives ask for sends a few numbers.
 //!
 //! The simulations ask for whatever they need when they need it. Each sits at a seat, on a stack of its own, and makes way for others of its thread while it waits; once all of
-//! a group have asked, the group's server takes the questions to the device. Two groups take turns, so that one computes on the host while the other waits.
+//! a group have asked, the group's server takes the questions to the device. Up to four groups take turns, so that some compute on the host while others wait.
 //! An answer depends on its question alone: not on who else is there, nor on their order.
 //!
 //! Where a gap has a film, a system isn't solved on the device, or two directions that aren't on the basis are asked for, the CPU answers that question.
@@ -38,8 +38,9 @@ use std::sync::Arc;
 const COLUMNS: usize = 12;
 /// Most members that wait for one device.
 const SEATS: usize = 2048;
-/// From how many scenes on they are parted into two groups.
-const PARTED: usize = 64;
+/// Most groups, and scenes of one at least: one is on the device while others compute on the host.
+const GROUPS: usize = 4;
+const GROUP: usize = 32;
 
 /// Seats for equal scenes of compressed bodies on a device.
 pub struct Batch {
@@ -67,7 +68,7 @@ impl Batch {
         let each = runner::scene_bytes(&model, SLOTS);
         let largest = context.adapter().largest_binding as usize;
         let most = each.iter().map(|bytes| largest / (*bytes).max(1)).min();
-        let groups = if scenes >= PARTED { 2 } else { 1 };
+        let groups = (scenes / GROUP).clamp(1, GROUPS);
         let seats = scenes.min(SEATS).min(groups * most.unwrap_or(1));
         if seats == 0 {
             return Ok(None);

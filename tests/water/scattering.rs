@@ -580,7 +580,7 @@ fn what_rests_and_what_turns_back_is_solved() {
             };
             body.motion = Some(vec![Motion::Sine {
                 amplitude: 0.005,
-                frequency: 25.0,
+                frequency: 50.0 * std::f64::consts::PI,
                 phase: 0.0,
                 offset: 0.0,
             }]);

@@ -61,7 +61,6 @@ pub use mesh::{Edge, TriMesh};
 pub(crate) use opposite::Opposite;
 pub use pairing::Pairing;
 pub use points::Ball;
-#[cfg(feature = "meshio")]
 pub(crate) use points::bounds;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};
 pub use wall::{HalfSpace, Wall, WallSurface};

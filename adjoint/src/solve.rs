@@ -88,7 +88,7 @@ pub fn is_scaled_above(a: &DMatrix<f64>, least: f64) -> bool {
     for i in 0..left.nrows() {
         left[(i, i)] -= room;
     }
-    left.iter().all(|x| x.is_finite()) && left.cholesky().is_some()
+    left.iter().all(|x| x.is_finite()) && Definite::new(left).is_some()
 }
 
 /// A symmetric matrix scaled to unit diagonal; rows without a positive one become zero.

@@ -96,9 +96,7 @@ impl Contacts {
         let mut out = Vec::new();
         for (a, (own, pose)) in self.shapes.iter().zip(poses).enumerate() {
             while let Some((_, b)) = bodies.next_if(|(first, _)| *first == a) {
-                let apart = |a, b| Some(self.apart(poses, a, b)).filter(|apart| *apart > 0.0);
-                let far = || apart(a, b).is_some_and(|apart| apart >= reach(a) + reach(b));
-                if self.pairing.has(a, b) && !far() {
+                if self.pairing.has(a, b) && !self.are_far(poses, [a, b], reach(a) + reach(b)) {
                     out.extend(self.pieces_of(a, Other::Body(b)));
                 }
             }
@@ -116,12 +114,13 @@ impl Contacts {
         out
     }
 
-    /// How far apart two bodies are at least, m, as boxes around them tell.
-    fn apart(&self, poses: &[Pose], a: usize, b: usize) -> f64 {
-        match (&self.casings[a], &self.casings[b]) {
-            (Some(own), Some(other)) => own.apart_at(&poses[a], other, &poses[b]),
-            _ => 0.0,
-        }
+    /// Whether boxes around two bodies tell that they aren't nearer than `reach`, m.
+    fn are_far(&self, poses: &[Pose], [a, b]: [usize; 2], reach: f64) -> bool {
+        let (Some(own), Some(other)) = (&self.casings[a], &self.casings[b]) else {
+            return false;
+        };
+        let apart = own.apart_at(&poses[a], other, &poses[b]);
+        apart > 0.0 && apart >= reach
     }
 
     /// Whether any of the bodies that `inside` names may come in contact with a wall or with one that it doesn't.

@@ -3,10 +3,11 @@
 use super::{Evaluation, System};
 use crate::coupling::scattering::Told;
 use nalgebra::DVector;
+use std::sync::Arc;
 
 /// Answers at one configuration, where many bodies are coupled by products; none elsewhere.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Answers(Vec<Told>);
+pub(super) struct Answers(Vec<Arc<Told>>);
 
 impl Evaluation<'_> {
     /// The answers that are known to velocities.
@@ -15,9 +16,9 @@ impl Evaluation<'_> {
             return Answers::default();
         };
         let twists = |v| at.motions().twists(&self.through_water(v));
-        let mut out: Vec<Told> = Vec::new();
+        let mut out: Vec<Arc<Told>> = Vec::new();
         for twists in all.into_iter().map(twists) {
-            if !out.iter().any(|told| *told.twists() == twists) {
+            if !out.iter().any(|told| told.twists == twists) {
                 out.extend(at.told_of(&twists));
             }
         }

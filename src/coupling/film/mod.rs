@@ -34,7 +34,7 @@ mod water;
 pub(crate) use apart::Apart;
 pub(crate) use placed::{MovingFilm, PlacedFilm};
 pub(crate) use set::{FilmBody, Films, MovingFilms, PlacedFilms};
-pub(crate) use surface::{Cluster, FilmSurface, clusters};
+pub(crate) use surface::{FilmSurface, TOGETHER};
 pub(crate) use water::Beside;
 
 use crate::adjoint::lie::Pose;

@@ -1,13 +1,13 @@
 //! The side of a film that its potential is solved on.
 
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench};
-use crate::geometry::{Casing, TriMesh, bounds};
+use crate::geometry::{Casing, Cluster, TriMesh, bounds, clusters};
 use crate::solver::elimination_order;
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
 
 /// Vertices in a [`Cluster`] at most.
-const TOGETHER: usize = 8;
+pub(crate) const TOGETHER: usize = 8;
 
 /// A body's surface as films see it, in the body's frame: linear elements on its faces.
 #[derive(Clone, Debug)]
@@ -34,15 +34,6 @@ pub(crate) struct FilmSurface {
     pub clusters: Vec<Cluster>,
     /// The vertices in an order of elimination, of all systems on some of them.
     pub order: Vec<usize>,
-}
-
-/// Vertices that lie together.
-#[derive(Clone, Debug)]
-pub(crate) struct Cluster {
-    pub vertices: Vec<usize>,
-    /// A ball around them.
-    pub center: Vec3,
-    pub radius: f64,
 }
 
 /// A face.
@@ -118,7 +109,7 @@ impl FilmSurface {
             center: ball.center,
             radius: ball.radius,
             casing: Casing::new(bounds(mesh.vertices().iter())),
-            clusters: clusters(mesh.vertices()),
+            clusters: clusters(mesh.vertices(), TOGETHER),
             order,
         }
     }
@@ -144,31 +135,4 @@ fn bulge(vertices: &[Vec3], faces: &mut [Element]) {
             ((normals[j] - normals[i]).dot(&edge) / 8.0).max(0.0)
         });
     }
-}
-
-/// The points in groups of [`TOGETHER`] at most, by halves across their longest side.
-pub(crate) fn clusters(points: &[Vec3]) -> Vec<Cluster> {
-    let (mut out, mut open) = (Vec::new(), vec![(0..points.len()).collect::<Vec<_>>()]);
-    while let Some(mut group) = open.pop() {
-        let Some(first) = group.first() else { continue };
-        let bounds = (points[*first], points[*first]);
-        let (low, high) = (group.iter()).fold(bounds, |(low, high), v| {
-            (low.inf(&points[*v]), high.sup(&points[*v]))
-        });
-        if group.len() > TOGETHER {
-            let axis = (high - low).imax();
-            group.sort_by(|a, b| points[*a][axis].total_cmp(&points[*b][axis]));
-            open.push(group.split_off(group.len() / 2));
-            open.push(group);
-            continue;
-        }
-        let center = (low + high) / 2.0;
-        let away = group.iter().map(|v| (points[*v] - center).norm());
-        out.push(Cluster {
-            radius: away.fold(0.0, f64::max),
-            center,
-            vertices: group,
-        });
-    }
-    out
 }

@@ -1,7 +1,8 @@
 //! The side of a bearing that its pressure is solved on.
 
 use crate::adjoint::lie::Vec3;
-use crate::coupling::film::{Cluster, clusters};
+use crate::coupling::film::TOGETHER;
+use crate::geometry::{Cluster, clusters};
 use crate::geometry::{Solid, TriMesh};
 
 /// Cosine between normals of a shape and of its mesh from which on they are the same one's.
@@ -39,7 +40,7 @@ impl BearingSurface {
             normals: vertices.iter().zip(&normals).map(upright).collect(),
             faces: mesh.faces().to_vec(),
             solid: solid.cloned(),
-            clusters: clusters(&vertices),
+            clusters: clusters(&vertices, TOGETHER),
             size: 2.0 * mesh.bounding_ball().radius,
             vertices,
         }

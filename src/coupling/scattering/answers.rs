@@ -270,8 +270,7 @@ impl Scattered<'_> {
         }
         let none = vec![0.0; self.model.mode_count()];
         if twists.iter().all(|x| *x == 0.0) {
-            return self.keep(Answer {
-                charges: vec![0.0; self.model.point_count()],
+            return self.keep(Told {
                 exchanged: twists.clone(),
                 twists: twists.clone(),
                 solved: twists.clone(),
@@ -306,9 +305,8 @@ impl Scattered<'_> {
             }
         };
         let left = plus(&modes, -1.0, &seen);
-        self.keep(Answer {
+        self.keep(Told {
             exchanged,
-            charges: self.charges(twists, &modes),
             twists: twists.clone(),
             solved: twists.clone(),
             modes,
@@ -316,28 +314,29 @@ impl Scattered<'_> {
         })
     }
 
-    fn keep(&self, answer: Answer) -> Arc<Answer> {
-        let answer = Arc::new(answer);
+    fn keep(&self, told: impl Into<Arc<Told>>) -> Arc<Answer> {
+        let told = told.into();
+        let charges = self.charges(&told.twists, &told.modes);
+        let answer = Arc::new(Answer { charges, told });
         self.kept().keep(answer.clone());
         answer
     }
 
     /// What is known of the answer to these body-frame twists.
-    pub fn told_of(&self, twists: &DVector<f64>) -> Option<Told> {
+    pub fn told_of(&self, twists: &DVector<f64>) -> Option<Arc<Told>> {
         self.kept().told(twists)
     }
 
     /// Knows an answer from the same poses again.
-    pub fn recall(&self, told: &Told) {
-        if self.kept().found(told.twists()).is_none() {
-            let charges = self.charges(told.twists(), told.modes());
-            self.keep(Answer::again(told.clone(), charges));
+    pub fn recall(&self, told: &Arc<Told>) {
+        if self.told_of(&told.twists).is_none() {
+            self.keep(told.clone());
         }
     }
 
     /// The next to recoil begins from what was told at poses nearby, with the twists of the same motion here.
     pub fn begin_near(&self, told: &Told, twists: DVector<f64>) {
-        let modes = told.modes().to_vec();
+        let modes = told.modes.clone();
         self.kept().near = Some(Near { twists, modes });
     }
 
@@ -415,8 +414,7 @@ impl Scattered<'_> {
 
     /// Keeps what recoiled as the answer to the twists that follow from it.
     pub fn settle(&self, twists: DVector<f64>, recoiled: Recoiled) -> Arc<Answer> {
-        self.keep(Answer {
-            charges: self.charges(&twists, &recoiled.modes),
+        self.keep(Told {
             exchanged: recoiled.exchanged,
             twists,
             solved: recoiled.twists,

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::coupling::CouplingReport;
 use nalgebra::DVector;
+use std::ops::Deref;
 use std::sync::Arc;
 
 /// Answers kept: those to the velocity, to a virtual one and to what is driven, at both ends of a pair, and a few steps from one velocity to the next.
@@ -11,10 +12,17 @@ const KEPT: usize = 10;
 /// What all bodies are in the water as they move.
 #[derive(Clone, Debug)]
 pub struct Answer {
+    /// α, all points: they follow from the rest.
+    pub charges: Vec<f64>,
+    /// What is kept of it beyond its poses.
+    pub(super) told: Arc<Told>,
+}
+
+/// An answer but for its charges.
+#[derive(Clone, Debug)]
+pub struct Told {
     /// Body-frame twists, 6 a body.
     pub twists: DVector<f64>,
-    /// α, all points.
-    pub charges: Vec<f64>,
     /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
     pub exchanged: DVector<f64>,
     /// The twists that modes and charges were solved for: the same but for what a solve leaves open.
@@ -24,56 +32,11 @@ pub struct Answer {
     pub(super) left: Vec<f64>,
 }
 
-/// An answer but for its charges, which follow from the rest: what is kept of it beyond its poses.
-#[derive(Clone, Debug)]
-pub struct Told {
-    twists: DVector<f64>,
-    exchanged: DVector<f64>,
-    solved: DVector<f64>,
-    modes: Vec<f64>,
-    left: Vec<f64>,
-}
+impl Deref for Answer {
+    type Target = Told;
 
-impl Told {
-    /// Body-frame twists, 6 a body.
-    pub fn twists(&self) -> &DVector<f64> {
-        &self.twists
-    }
-
-    pub(super) fn modes(&self) -> &[f64] {
-        &self.modes
-    }
-}
-
-impl Answer {
-    /// What is kept of it.
-    fn told(&self) -> Told {
-        Told {
-            twists: self.twists.clone(),
-            exchanged: self.exchanged.clone(),
-            solved: self.solved.clone(),
-            modes: self.modes.clone(),
-            left: self.left.clone(),
-        }
-    }
-
-    /// With charges that follow from the rest.
-    pub(super) fn again(told: Told, charges: Vec<f64>) -> Self {
-        let Told {
-            twists,
-            exchanged,
-            solved,
-            modes,
-            left,
-        } = told;
-        Self {
-            twists,
-            charges,
-            exchanged,
-            solved,
-            modes,
-            left,
-        }
+    fn deref(&self) -> &Told {
+        &self.told
     }
 }
 
@@ -106,9 +69,9 @@ impl Kept {
     }
 
     /// What is told of these twists.
-    pub fn told(&self, twists: &DVector<f64>) -> Option<Told> {
+    pub fn told(&self, twists: &DVector<f64>) -> Option<Arc<Told>> {
         let found = self.answers.iter().find(|a| a.twists == *twists)?;
-        Some(found.told())
+        Some(found.told.clone())
     }
 
     /// Keeps an answer, the oldest of many making room.

@@ -228,14 +228,6 @@ impl Scattering {
         &self.levels
     }
 
-    /// Points of the bodies themselves.
-    fn point_count(&self) -> usize {
-        self.bodies
-            .len()
-            .checked_sub(1)
-            .map_or(0, |last| self.points[last].end)
-    }
-
     fn mode_count(&self) -> usize {
         end(&self.modes)
     }

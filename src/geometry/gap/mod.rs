@@ -15,10 +15,10 @@ mod pair;
 
 use crate::error::{Error, Result};
 use crate::geometry::casing::Casing;
+use crate::geometry::cluster::{Cluster, clusters};
 use crate::geometry::convex::Solid;
 use crate::geometry::mesh::TriMesh;
 use crate::geometry::pairing::Pairing;
-use crate::geometry::points::{Ball, bounds};
 use crate::geometry::tree::MeshTree;
 use crate::geometry::wall::{HalfSpace, Wall};
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -325,28 +325,12 @@ pub struct Share {
     /// Points of the inner body, in its frame, with their parts of its volume: cones from the
     /// centroid to the faces, negative where the body isn't seen from there.
     samples: Vec<(Vec3, f64)>,
-    /// Balls around points that lie together, with the positive parts of each.
-    clusters: Vec<(Ball, f64)>,
+    /// Points that lie together, with their positive parts.
+    clusters: Vec<(Cluster, f64)>,
 }
 
 /// Points of a cluster at most.
 const CLUSTER: usize = 48;
-
-/// Balls around samples that lie together, with their positive parts.
-fn clusters(samples: &mut [(Vec3, f64)], out: &mut Vec<(Ball, f64)>) {
-    if samples.len() <= CLUSTER {
-        let part = samples.iter().map(|(_, part)| part.max(0.0)).sum();
-        let ball = Ball::around(samples.iter().map(|(x, _)| x));
-        out.push((ball, part));
-        return;
-    }
-    let [low, high] = bounds(samples.iter().map(|(x, _)| x));
-    let (axis, half) = ((high - low).imax(), samples.len() / 2);
-    samples.select_nth_unstable_by(half, |(x, _), (y, _)| x[axis].total_cmp(&y[axis]));
-    let (left, right) = samples.split_at_mut(half);
-    clusters(left, out);
-    clusters(right, out);
-}
 
 impl Share {
     /// The part of the smaller one of two bodies inside the larger, by volume; none if one of them
@@ -372,14 +356,20 @@ impl Share {
             })
         });
         let samples: Vec<(Vec3, f64)> = cones.collect();
-        let mut together = Vec::new();
-        clusters(&mut samples.clone(), &mut together);
+        let points: Vec<Vec3> = samples.iter().map(|(x, _)| *x).collect();
+        let part = |v: &usize| samples[*v].1.max(0.0);
+        let together = clusters(&points, CLUSTER).into_iter();
+        let clusters = together.map(|c| {
+            let parts = c.vertices.iter().map(part).sum();
+            (c, parts)
+        });
+        let clusters = clusters.collect();
         Some(Self {
             inner,
             outer,
             tree: MeshTree::new(large),
             samples,
-            clusters: together,
+            clusters,
         })
     }
 
@@ -401,8 +391,8 @@ impl Share {
     pub fn above(&self, poses: &[Pose], limit: f64) -> Option<f64> {
         let (inner, outer) = (&poses[self.inner], &poses[self.outer]);
         let there = |x: &Vec3| outer.apply_inverse(&inner.apply(x));
-        let may = |ball: &Ball| self.tree.meets_box(&there(&ball.center), ball.radius);
-        let may = self.clusters.iter().filter(|(ball, _)| may(ball));
+        let may = |c: &Cluster| self.tree.meets_box(&there(&c.center), c.radius);
+        let may = self.clusters.iter().filter(|(c, _)| may(c));
         // What isn't a number may be anywhere.
         if may.map(|(_, part)| part).sum::<f64>() <= limit {
             return None;

@@ -58,7 +58,7 @@ impl Pair {
     }
 
     /// What holds the sources off, if anything does.
-    pub fn film<'f, 'a>(&self, films: &'f PlacedFilms<'a>) -> Option<(Apart, &'f PlacedFilm<'a>)> {
+    pub fn film<'f>(&self, films: &'f PlacedFilms) -> Option<(Apart, &'f PlacedFilm)> {
         self.apart
             .and_then(|apart| Some((apart, films.of(&apart)?)))
     }

@@ -78,13 +78,13 @@ impl FilmLoad {
 
 /// Bodies that films hold apart.
 #[derive(Clone, Copy)]
-pub(super) struct Held<'h, 'a> {
-    pub films: &'h PlacedFilms<'a>,
+pub(super) struct Held<'h> {
+    pub films: &'h PlacedFilms,
     /// As the bodies are displaced.
     pub moving: &'h MovingFilms<'h>,
 }
 
-impl Held<'_, '_> {
+impl Held<'_> {
     /// Adds what the films themselves have.
     pub fn add_water(
         &self,

@@ -21,12 +21,17 @@ pub(crate) struct Region {
 impl Region {
     /// Around all that is as near to a ball as `reach` (m), and a little more for rounding.
     pub fn around(ball: &Ball, reach: f64) -> Self {
-        let half = ball.radius + reach;
-        let room = ROUNDING * (ball.center.amax() + half.abs());
-        let half = Vec3::repeat(half + room);
+        Self::of_box(ball.center, Vec3::repeat(ball.radius), reach)
+    }
+
+    /// The same of a box, by its middle and half of its sides.
+    pub fn of_box(center: Vec3, half: Vec3, reach: f64) -> Self {
+        let half = half.map(|x| x + reach);
+        let room = ROUNDING * (center.amax() + half.amax());
+        let half = half.map(|x| x + room);
         Self {
-            low: ball.center - half,
-            high: ball.center + half,
+            low: center - half,
+            high: center + half,
         }
     }
 

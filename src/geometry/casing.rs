@@ -1,5 +1,6 @@
 //! Boxes around bodies along the axes of their own frames: how far apart two are at least, which for flat and long bodies says far more than balls do.
 
+use crate::geometry::broad::Region;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// Room for rounding, of the coordinates.
@@ -29,6 +30,12 @@ impl Casing {
         let low = (self.center - self.half).inf(&(other.center - other.half));
         let high = (self.center + self.half).sup(&(other.center + other.half));
         Self::new([low, high])
+    }
+
+    /// A box along the world's axes around all that is as near to it as `reach` (m), at a pose.
+    pub fn region(&self, pose: &Pose, reach: f64) -> Region {
+        let half = pose.rotation.abs() * self.half;
+        Region::of_box(pose.apply(&self.center), half, reach)
     }
 
     /// How far apart what two hold is at least, m, `other` at the pose `there` in the frame of this one: the widest of the gaps along the axes of both. Zero where it says nothing.

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Over the wall z = 0, which a film is compared at with one that is held `floor` apart at contact.
-fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Film {
+fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Arc<Film> {
     let mesh = shape::build(shape, Path::new("."), Some(faces)).unwrap();
     let wall = Wall::rigid([0.0; 3], [0.0, 0.0, 1.0]);
     let other = Side::Wall(Image::of_walls(&[wall]).unwrap()[1]);
@@ -26,11 +26,11 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Film {
         rim_to_wall: 0.65,
         in_corners: true,
     };
-    Film::new(0, other, between, 4.0 * floor, &shares)
+    Arc::new(Film::new(0, other, between, 4.0 * floor, &shares))
 }
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.
-fn added(film: &Film, pose: &Pose, k: usize) -> (f64, f64) {
+fn added(film: &Arc<Film>, pose: &Pose, k: usize) -> (f64, f64) {
     let mut twists = DMatrix::zeros(6, 1);
     twists[(k, 0)] = 1.0;
     let placed = PlacedFilm::new(film, &[*pose], &twists).unwrap();

@@ -4,7 +4,7 @@ use super::clearance::Clearance;
 use super::gap_error::{Across, Carried, GapError};
 use super::resolved::{Resolved, narrowest};
 use crate::adjoint::lie::Pose;
-use crate::coupling::film::Extent;
+use crate::coupling::film::{Extent, Films};
 use crate::geometry::{Gap, Other};
 use std::f64::consts::PI;
 
@@ -23,21 +23,25 @@ pub(crate) struct GapModel {
     pub carried: Option<Carried>,
     /// Relative error that compression aims at, per body.
     pub tolerances: Vec<f64>,
-    /// Where there may be films.
-    pub films: Vec<Extent>,
+    /// All films that there may be, by the numbers of bodies in the water.
+    pub films: Films,
+    /// The bodies in the water, which ascend.
+    pub in_water: Vec<usize>,
     /// What compressed bodies resolve.
     pub resolved: Vec<Resolved>,
 }
 
 impl GapModel {
     /// The film that a pair may have, and whether the faces of the gap's second body carry it.
-    fn film(&self, gap: &Gap) -> Option<(&Extent, bool)> {
-        self.films.iter().find_map(|film| {
-            let own = (film.body, film.other) == (gap.first, gap.second);
-            let turned =
-                gap.second == Other::Body(film.body) && film.other == Other::Body(gap.first);
-            (own || turned).then_some((film, turned))
-        })
+    fn film(&self, gap: &Gap) -> Option<(Extent, bool)> {
+        let number = |b: usize| self.in_water.binary_search(&b).ok();
+        let first = number(gap.first)?;
+        let second = match gap.second {
+            Other::Body(b) => Other::Body(number(b)?),
+            wall => wall,
+        };
+        let film = self.films.extent(first, second)?;
+        Some((film, film.body != first))
     }
 
     /// The gap from which on a pair has a film, m.
@@ -45,10 +49,9 @@ impl GapModel {
         self.film(gap).map(|(film, _)| film.reach)
     }
 
-    /// The widest gap that has a film, m; 0 where there is none.
+    /// The gap from which on no pair has a film, m; 0 where there is none.
     pub fn widest(&self) -> f64 {
-        let films = self.films.iter().map(|film| film.reach);
-        films.fold(0.0, f64::max)
+        self.films.widest()
     }
 
     /// What is known of a gap at these poses.

@@ -15,7 +15,6 @@ use super::shape::ShapeChange;
 use super::submerged::{Discretisation, SubmergedBody};
 use crate::adjoint::lie::{Mat6, Pose};
 use crate::coupling::Coupling;
-use crate::coupling::film::Extent;
 use crate::coupling::reduced::compress::CompressSettings;
 use crate::geometry::{Gap, Gaps, Other};
 use crate::scene::Scene;
@@ -90,7 +89,7 @@ pub(crate) fn prepare(
     )?;
     (problem.plan, problem.folder) = (&planned.plan, folder);
     clearance.by_sources = !fidelity.kind().solves_alone() && method.by_sources();
-    clearance.films = choices.numerics.films && fidelity.kind().compresses() && !problem.products;
+    clearance.films = choices.numerics.films && fidelity.kind().compresses();
     clearance.resolved_edges = match (clearance.films, fidelity.kind().compresses()) {
         (true, _) => FILM_EDGES,
         // What compressed bodies resolve isn't a matter of edges.
@@ -142,18 +141,11 @@ pub(crate) fn prepare(
             tolerances[*b] = tolerance(problem.chosen(k), d);
         }
     }
-    let in_scene = |film: &Extent| Extent {
-        body: numbers[film.body],
-        other: match film.other {
-            Other::Body(b) => Other::Body(numbers[b]),
-            wall => wall,
-        },
-        ..*film
-    };
     let gap_model = GapModel {
         carried: made.carried.filter(|_| scene.fluid.density > 0.0),
         tolerances,
-        films: made.films.iter().map(in_scene).collect(),
+        films: made.films,
+        in_water: numbers.clone(),
         resolved,
     };
     let mut reasons = planned.reasons;

@@ -3,6 +3,7 @@
 use super::device::Device;
 use super::exchange::{Exchange, faster};
 use super::method::kind::Problem;
+use crate::coupling::film::Films;
 use crate::coupling::reduced::{Reduced, ReducedBody};
 use crate::coupling::scattering::{Levels, Scattering};
 use crate::geometry::Image;
@@ -33,13 +34,14 @@ pub(super) fn by_products(exchange: Exchange, problem: &Problem) -> Result<bool>
     }
 }
 
-/// The bodies coupled by products, whose sums are made on the device.
+/// The bodies coupled by products, with these films in their gaps, whose sums are made on the device.
 ///
 /// # Errors
 /// An accuracy out of range, walls that aren't perpendicular to each other, or a device that fails.
 pub(super) fn scattering(
     problem: &Problem,
     made: Vec<Arc<ReducedBody>>,
+    films: Films,
     device: &mut Device,
 ) -> Result<Scattering> {
     let names = problem.bodies.iter().map(|b| b.name.to_string()).collect();
@@ -53,7 +55,7 @@ pub(super) fn scattering(
     let images = Image::of_walls(problem.walls)?;
     let (bodies, walls, excluded) = (made.clone(), problem.walls, &problem.excluded);
     let many = Scattering::between(made, names, problem.start, images, levels)?;
-    device.scattering(many.excluding(excluded)?, || {
+    device.scattering(many.excluding(excluded)?.with_films(films), || {
         Reduced::new(bodies, walls, |_, _| None)?.excluding(excluded)
     })
 }

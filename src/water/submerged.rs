@@ -4,7 +4,7 @@ use super::gap_error::Carried;
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Mat6, Pose, Vec3};
 use crate::coupling::Coupling;
-use crate::coupling::film::Extent;
+use crate::coupling::film::Films;
 use crate::coupling::reduced::Region;
 use crate::geometry::{Refinement, Solid, TriMesh};
 use crate::multibody::Tree;
@@ -46,8 +46,8 @@ pub(crate) struct Made {
     pub warnings: Vec<String>,
     /// By what the water in gaps is carried; none where nothing is known of its error.
     pub carried: Option<Carried>,
-    /// Where there may be films, by the bodies' numbers in the water.
-    pub films: Vec<Extent>,
+    /// All films that there may be, by the bodies' numbers in the water.
+    pub films: Films,
 }
 
 /// How a body is seen by the coupling, and how well.

@@ -23,6 +23,7 @@ mod pressure_films;
 mod reduced;
 mod refine;
 mod scattering;
+mod scattering_films;
 mod sensors;
 mod several_pieces;
 mod shape_slopes;

@@ -22,6 +22,7 @@
 //! displacement, forward and reverse give second derivatives.
 
 mod apart;
+mod bodies;
 mod flow;
 mod jet;
 mod layer;
@@ -32,13 +33,13 @@ mod surface;
 mod water;
 
 pub(crate) use apart::Apart;
+pub(crate) use bodies::FilmBody;
 pub(crate) use placed::{MovingFilm, PlacedFilm};
-pub(crate) use set::{FilmBody, Films, MovingFilms, PlacedFilms};
+pub(crate) use set::{Films, MovingFilms, PlacedFilms};
 pub(crate) use surface::{FilmSurface, TOGETHER};
 pub(crate) use water::Beside;
 
-use crate::adjoint::lie::Pose;
-use crate::geometry::{Casing, Image, Opposite, Other};
+use crate::geometry::{Image, Opposite};
 use crate::solver::SparsePattern;
 use std::sync::{Arc, Mutex};
 use surface::Element;
@@ -51,7 +52,7 @@ pub(crate) struct Width {
 }
 
 /// What a coupling's films are like.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shares {
     /// How far bodies are held apart at contact, in the gap from which on they aren't.
     pub floor: f64,
@@ -65,12 +66,22 @@ pub(crate) struct Shares {
     pub in_corners: bool,
 }
 
+impl Shares {
+    /// Distances between which the flow in a film goes over into that around the bodies, m, where the one on whose faces it is solved has this size, m.
+    fn rims(&self, other: &Side, size: f64) -> [f64; 2] {
+        let start = match other {
+            Side::Body(_) => self.rim,
+            Side::Wall(_) => self.rim_to_wall,
+        };
+        [start, 2.0 * start].map(|part| part * size)
+    }
+}
+
 /// Where a film is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Extent {
     /// The body on whose faces it is solved.
     pub body: usize,
-    pub other: Other,
     /// The gap from which on it is there, m.
     pub reach: f64,
     /// Its edges over those of the body's faces.
@@ -94,8 +105,6 @@ pub(crate) struct Film {
     pub other: Side,
     pub surface: Arc<FilmSurface>,
     pub opposite: Arc<Opposite>,
-    /// A box around the body that is opposite.
-    casing: Option<Casing>,
     pub width: Width,
     /// Distances between which the flow in it goes over into that around the bodies, m.
     rim: [f64; 2],
@@ -113,18 +122,13 @@ impl Film {
         reach: f64,
         shares: &Shares,
     ) -> Self {
-        let start = match other {
-            Side::Body(_) => shares.rim,
-            Side::Wall(_) => shares.rim_to_wall,
-        };
-        let rim = [start, 2.0 * start].map(|part| part * surface.size);
+        let rim = shares.rims(&other, surface.size);
         // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
         let reach = rim[1].min(reach);
         Self {
             body,
             other,
             surface,
-            casing: opposite.casing(),
             opposite,
             width: Width {
                 floor: shares.floor * reach,
@@ -132,17 +136,6 @@ impl Film {
             },
             rim,
             pattern: Arc::default(),
-        }
-    }
-
-    /// Whether boxes tell that the gap is wider than the film reaches.
-    fn is_far(&self, poses: &[Pose]) -> bool {
-        match (self.other, &self.casing) {
-            (Side::Body(b), Some(casing)) => {
-                let own = &self.surface.casing;
-                own.apart_at(&poses[self.body], casing, &poses[b]) > self.width.reach
-            }
-            _ => false,
         }
     }
 

@@ -9,14 +9,14 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6, cross_force};
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Columns up to which all pairs of them cost no more than a few derivatives one by one.
 const FEW: usize = 6;
 
 /// A film whose gap is below what others resolve.
-pub(crate) struct PlacedFilm<'a> {
-    pub film: &'a Film,
+pub(crate) struct PlacedFilm {
+    pub film: Arc<Film>,
     /// Pose of the first body in the frame of the other, or in that of the world.
     pub(super) relative: Pose,
     /// Frame of what is opposite, to world.
@@ -48,18 +48,19 @@ pub(crate) struct MovingFlow(pub(super) Flow<Dual64>);
 
 /// A film along a displacement.
 pub(crate) struct MovingFilm<'a> {
-    pub placed: &'a PlacedFilm<'a>,
+    pub placed: &'a PlacedFilm,
     frame: Displaced<'a, Dual64>,
     layer: Layer<Dual64>,
     reverse: OnceLock<Reverse<Dual64>>,
 }
 
-impl<'a> PlacedFilm<'a> {
+impl PlacedFilm {
     /// For a basis of body-frame twists. None where the gap is wide. `Err`: a distance that isn't positive, or 0 where the film has no solution.
-    pub fn new(film: &'a Film, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Option<Self>, f64> {
-        if film.is_far(poses) {
-            return Ok(None);
-        }
+    pub fn new(
+        film: &Arc<Film>,
+        poses: &[Pose],
+        basis: &DMatrix<f64>,
+    ) -> Result<Option<Self>, f64> {
         let frame = match film.other {
             Side::Body(b) => poses[b],
             Side::Wall(_) => Pose::identity(),
@@ -74,7 +75,7 @@ impl<'a> PlacedFilm<'a> {
         };
         let system = film.system(&layer).ok_or(0.0)?;
         let mut out = Self {
-            film,
+            film: film.clone(),
             relative,
             frame,
             shift: layer.shift.map(Vec3::from),
@@ -106,7 +107,7 @@ impl<'a> PlacedFilm<'a> {
     }
 
     fn in_reverse(&self) -> &Reverse<f64> {
-        (self.reverse).get_or_init(|| self.layer.reverse(self.film, &self.still()))
+        (self.reverse).get_or_init(|| self.layer.reverse(&self.film, &self.still()))
     }
 
     pub(super) fn twists(&self, x: &DVector<f64>) -> Twists {
@@ -165,6 +166,42 @@ impl<'a> PlacedFilm<'a> {
         }
     }
 
+    /// The body on whose faces it is solved, and what is opposite.
+    pub fn sides(&self) -> (usize, Side) {
+        (self.film.body, self.film.other)
+    }
+
+    /// The impulses of a unit of each twist of these bodies, of which it has one or two, in their order: body frames.
+    pub fn impulses_of_each(&self, bodies: &[usize; 2]) -> DMatrix<f64> {
+        let own = |b: usize| b == self.film.body;
+        let count = match self.film.other {
+            Side::Body(_) => 12,
+            Side::Wall(_) => 6,
+        };
+        let mut out = DMatrix::zeros(count, count);
+        for k in 0..count {
+            let unit = Vec6::ith(k % 6, 1.0);
+            let x = match own(bodies[k / 6]) {
+                true => [unit, Vec6::zeros()],
+                false => [Vec6::zeros(), self.relative.twist_to_body(&unit)],
+            };
+            let potential = self.system.potential(&x);
+            let apart = potential.iter().map(|psi| psi[0] - psi[1]);
+            let [impulse, back] = self.system.impulses(apart);
+            for (b, rows) in bodies
+                .iter()
+                .zip(out.column_mut(k).as_mut_slice().chunks_exact_mut(6))
+            {
+                let told = match own(*b) {
+                    true => impulse,
+                    false => self.relative.wrench_to_world(&back),
+                };
+                rows.copy_from_slice(told.as_slice());
+            }
+        }
+        out
+    }
+
     /// The film along spatial displacements of the bodies.
     pub fn along(&self, z: &[Vec6]) -> Option<MovingFilm<'_>> {
         let relative = match self.film.other {
@@ -172,7 +209,7 @@ impl<'a> PlacedFilm<'a> {
             Side::Wall(_) => z[self.film.body],
         };
         let frame = Displaced::new(&self.relative, &self.frame.twist_to_body(&relative));
-        let layer = Layer::new(self.film, &frame, &self.near, Some(&self.layer))?;
+        let layer = Layer::new(&self.film, &frame, &self.near, Some(&self.layer))?;
         Some(MovingFilm {
             placed: self,
             frame,
@@ -231,7 +268,7 @@ impl<'a> PlacedFilm<'a> {
     /// ∇E(x, e) of every e that was solved for.
     fn pulled(&self, x: &DVector<f64>) -> Vec<Vec6> {
         let all = self.wrenches.get_or_init(|| {
-            let rates = self.in_reverse().rates(self.film, &self.layer);
+            let rates = self.in_reverse().rates(&self.film, &self.layer);
             let (still, layer) = (self.still(), &self.layer);
             let flow = |s: &Solved| {
                 let solved = (&self.system, &s.potential[..]);
@@ -279,7 +316,7 @@ impl<'a> PlacedFilm<'a> {
 
 impl MovingFilm<'_> {
     fn in_reverse(&self) -> &Reverse<Dual64> {
-        (self.reverse).get_or_init(|| self.layer.reverse(self.placed.film, &self.frame))
+        (self.reverse).get_or_init(|| self.layer.reverse(&self.placed.film, &self.frame))
     }
 
     /// Rate of the shift in the frame `at` (0: of the first).
@@ -303,13 +340,13 @@ impl MovingFilm<'_> {
 
     /// ∇E(x, y) and its rate, frame of the other.
     pub fn wrench(&self, x: &MovingFlow, y: &MovingFlow) -> (Vec6, Vec6) {
-        let film = self.placed.film;
+        let film = &self.placed.film;
         rates(&film.wrench((&self.layer, self.in_reverse()), &self.frame, &x.0, &y.0))
     }
 
     /// Adds the rate of the impulses of a flow.
     pub fn add_impulse_rate(&self, x: &MovingFlow, out: &mut DVector<f64>) {
-        let film = self.placed.film;
+        let film = &self.placed.film;
         let [own, other] = x.0.impulses;
         let mut add = |b: usize, wrench: &Screw<Dual64>| {
             let mut rows = out.fixed_rows_mut::<6>(6 * b);

@@ -1,86 +1,54 @@
 //! The films of all pairs of bodies, and of bodies and rigid walls.
 
+use super::bodies::FilmBody;
 use super::placed::{MovingFilm, PlacedFilm};
-use super::surface::FilmSurface;
 use super::{Apart, Beside, Extent, Film, Shares, Side};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::Exclusions;
 use crate::error::in_order;
-use crate::geometry::{Image, Opposite, Other, Solid, TriMesh, Wall, WallSurface};
+use crate::geometry::{Image, Neighbours, Opposite, Other, Wall, WallSurface};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::borrow::Cow;
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// Faces of a curved shape from which on there are enough for a film; they lie in one another else.
-const ENOUGH: usize = 10_000;
-/// The same of others. At an edge more of them wouldn't help (docs/accuracy-coupled.md), and fewer are far too stiff.
-const ENOUGH_FLAT: usize = 1_000;
-
-/// What films see of a body: the faces that they may be solved on, and what others' faces are opposite to.
-#[derive(Clone)]
-pub(crate) struct FilmBody {
-    pub surface: Arc<FilmSurface>,
-    opposite: Arc<Opposite>,
-    /// Whether it may have flat faces.
-    flat: bool,
-}
-
-impl FilmBody {
-    /// Of each body, from its surface in its own frame, and its shape by formula where it has one; the `same` ones share theirs. Where faces are few for
-    /// a film they are split into four up to as many times as `splits` says of a body.
-    pub fn all(
-        surfaces: &[(&TriMesh, Option<&Solid>)],
-        splits: impl Fn(usize) -> usize,
-        same: impl Fn(usize, usize) -> bool,
-    ) -> Vec<Self> {
-        let mut out: Vec<Self> = Vec::with_capacity(surfaces.len());
-        for (b, (mesh, solid)) in surfaces.iter().enumerate() {
-            out.push(match (0..b).find(|a| same(*a, b)) {
-                Some(a) => out[a].clone(),
-                None => {
-                    let (mesh, finer) = split(mesh, *solid, splits(b));
-                    Self {
-                        surface: Arc::new(FilmSurface {
-                            finer,
-                            ..FilmSurface::new(&mesh, solid.is_some())
-                        }),
-                        opposite: Arc::new(Opposite::of_body(*solid, &mesh)),
-                        flat: solid.is_none_or(Solid::has_faces),
-                    }
-                }
-            });
-        }
-        out
-    }
-}
-
-/// A finer mesh, or of the curved shape that it stands for, and its edges over those that it had.
-fn split<'m>(mesh: &'m TriMesh, solid: Option<&Solid>, times: usize) -> (Cow<'m, TriMesh>, f64) {
-    let (mut out, mut finer) = (Cow::Borrowed(mesh), 1.0);
-    let curved = solid.filter(|solid| solid.is_curved());
-    let enough = curved.map_or(ENOUGH_FLAT, |_| ENOUGH);
-    for _ in 0..times {
-        if out.faces().len() >= enough {
-            break;
-        }
-        let split = out.split();
-        out = Cow::Owned(match curved {
-            None => split,
-            Some(solid) => split.moved(|x| {
-                let field = solid.field(x);
-                x - field.distance * field.gradient
-            }),
-        });
-        finer *= 0.5;
-    }
-    (out, finer)
-}
-
-/// All films that there may be.
+/// All films that there may be: those of gaps that were narrow once are kept, others made when their gaps are.
 #[derive(Clone, Default)]
-pub(crate) struct Films(Vec<Film>);
+pub(crate) struct Films {
+    bodies: Vec<FilmBody>,
+    /// The gap from which on each body is resolved, m.
+    reaches: Vec<f64>,
+    shares: Shares,
+    walls: Vec<RigidWall>,
+    excluded: Exclusions,
+    made: Arc<Mutex<BTreeMap<Place, Arc<Film>>>>,
+}
+
+/// Where a film is: those at walls come first, wall by wall, then pairs of bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    /// Number of the rigid wall, and the body.
+    Wall(usize, usize),
+    /// Two bodies, the lower number first.
+    Bodies(usize, usize),
+}
+
+#[derive(Clone)]
+struct RigidWall {
+    /// Number of the wall.
+    number: usize,
+    image: Image,
+    plane: Arc<Opposite>,
+}
+
+impl fmt::Debug for Films {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (bodies, walls) = (self.bodies.len(), self.walls.len());
+        write!(f, "films of {bodies} bodies and {walls} rigid walls")
+    }
+}
 
 impl Films {
     /// From the gaps, one a body, m, below which it isn't resolved.
@@ -88,69 +56,140 @@ impl Films {
     /// # Errors
     /// A wall without normal.
     pub fn new(
-        bodies: &[FilmBody],
-        reaches: &[f64],
+        bodies: Vec<FilmBody>,
+        reaches: Vec<f64>,
         shares: &Shares,
         walls: &[Wall],
     ) -> Result<Self> {
-        let film = |body: usize, other, opposite: &Arc<Opposite>, reach: f64| {
-            let between = (bodies[body].surface.clone(), opposite.clone());
-            Film::new(body, other, between, reach, shares)
-        };
-        let mut out = Vec::new();
-        let rigid = |wall: &&Wall| wall.surface == WallSurface::Rigid;
-        let everywhere = shares.in_corners || walls.iter().filter(rigid).count() < 2;
-        for (w, wall) in walls.iter().enumerate() {
-            if rigid(&wall) {
-                let image = Image::of_walls(std::slice::from_ref(wall))?[1];
-                let plane = Arc::new(Opposite::of_wall(wall.half_space(w)?));
-                let all = reaches.iter().enumerate();
-                let all = all.filter(|(b, _)| everywhere || !bodies[*b].flat);
-                out.extend(all.map(|(b, reach)| film(b, Side::Wall(image), &plane, *reach)));
+        let mut rigid = Vec::new();
+        for (number, wall) in walls.iter().enumerate() {
+            if wall.surface == WallSurface::Rigid {
+                rigid.push(RigidWall {
+                    number,
+                    image: Image::of_walls(std::slice::from_ref(wall))?[1],
+                    plane: Arc::new(Opposite::of_wall(wall.half_space(number)?)),
+                });
             }
         }
-        for a in 0..bodies.len() {
-            for b in a + 1..bodies.len() {
-                // The smaller one's faces lie within the gap.
-                let larger = bodies[b].surface.size < bodies[a].surface.size;
-                let (own, other) = if larger { (b, a) } else { (a, b) };
-                let reach = reaches[a].max(reaches[b]);
-                out.push(film(own, Side::Body(other), &bodies[other].opposite, reach));
-            }
-        }
-        Ok(Self(out))
+        Ok(Self {
+            bodies,
+            reaches,
+            shares: *shares,
+            walls: rigid,
+            ..Self::default()
+        })
     }
 
     /// Drops those between bodies that don't feel each other.
     pub fn exclude(&mut self, pairs: &Exclusions) {
-        self.0.retain(|film| match film.other {
-            Side::Body(b) => !pairs.contains(film.body, b),
-            Side::Wall(_) => true,
-        });
+        self.excluded = pairs.clone();
     }
 
-    /// Where each is, by the numbers of bodies and walls.
-    ///
-    /// # Errors
-    /// A wall without normal.
-    pub fn extents(&self, walls: &[Wall]) -> Result<Vec<Extent>> {
-        let mut images = Vec::with_capacity(walls.len());
-        for wall in walls {
-            images.push(Image::of_walls(std::slice::from_ref(wall))?[1]);
-        }
-        let extent = |film: &Film| {
-            let other = match film.other {
-                Side::Body(b) => Other::Body(b),
-                Side::Wall(image) => Other::Wall(images.iter().position(|i| *i == image)?),
-            };
-            Some(Extent {
-                body: film.body,
-                other,
-                reach: film.width.reach,
-                finer: film.surface.finer,
-            })
+    /// Whether there may be none.
+    pub fn is_empty(&self) -> bool {
+        self.at_walls().chain(self.pairs()).next().is_none()
+    }
+
+    /// Whether a body may have films at walls.
+    fn has_at_walls(&self, body: &FilmBody) -> bool {
+        self.shares.in_corners || self.walls.len() < 2 || !body.flat
+    }
+
+    /// Those of bodies that may have films at walls.
+    fn at_walls(&self) -> impl Iterator<Item = Place> {
+        let bodies = self.bodies.iter().enumerate();
+        let bodies = bodies.filter(|(_, body)| self.has_at_walls(body));
+        let bodies: Vec<usize> = bodies.map(|(b, _)| b).collect();
+        let walls = 0..self.walls.len();
+        walls.flat_map(move |w| bodies.clone().into_iter().map(move |b| Place::Wall(w, b)))
+    }
+
+    /// All pairs of bodies that may have films.
+    fn pairs(&self) -> impl Iterator<Item = Place> {
+        let n = self.bodies.len();
+        let all = (0..n).flat_map(move |a| (a + 1..n).map(move |b| (a, b)));
+        let all = all.filter(|(a, b)| !self.excluded.contains(*a, *b));
+        all.map(|(a, b)| Place::Bodies(a, b))
+    }
+
+    /// The body on whose faces it is solved, what is opposite, and the gap from which on it is there, m.
+    fn between(&self, place: Place) -> (usize, Side, f64) {
+        let (body, other, reach) = match place {
+            Place::Wall(w, b) => (b, Side::Wall(self.walls[w].image), self.reaches[b]),
+            Place::Bodies(a, b) => {
+                // The smaller one's faces lie within the gap.
+                let larger = self.bodies[b].surface.size < self.bodies[a].surface.size;
+                let (own, other) = if larger { (b, a) } else { (a, b) };
+                let reach = self.reaches[a].max(self.reaches[b]);
+                (own, Side::Body(other), reach)
+            }
         };
-        Ok(self.0.iter().filter_map(extent).collect())
+        let [_, end] = self.shares.rims(&other, self.bodies[body].surface.size);
+        // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
+        (body, other, end.min(reach))
+    }
+
+    /// Where the film is between a body and another, or a wall by its number, if there may be one.
+    pub fn extent(&self, first: usize, second: Other) -> Option<Extent> {
+        let known = |b: usize| b < self.bodies.len();
+        let place = match second {
+            Other::Body(b) if known(first) && known(b) && first != b => {
+                let (a, b) = (first.min(b), first.max(b));
+                (!self.excluded.contains(a, b)).then_some(Place::Bodies(a, b))
+            }
+            Other::Body(_) => None,
+            Other::Wall(number) => {
+                let wall = self.walls.iter().position(|w| w.number == number)?;
+                let here = known(first) && self.has_at_walls(&self.bodies[first]);
+                here.then_some(Place::Wall(wall, first))
+            }
+        }?;
+        let (body, _, reach) = self.between(place);
+        Some(Extent {
+            body,
+            reach,
+            finer: self.bodies[body].surface.finer,
+        })
+    }
+
+    /// The gap from which on there is none anywhere, m; 0 where there may be none.
+    pub fn widest(&self) -> f64 {
+        match self.is_empty() {
+            true => 0.0,
+            false => self.reaches.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
+    /// Where gaps may be narrow at these poses, in order.
+    fn near(&self, poses: &[Pose]) -> Vec<Place> {
+        let regions = self.bodies.iter().zip(poses).zip(&self.reaches);
+        let regions = regions.map(|((body, pose), reach)| Some(body.casing.region(pose, *reach)));
+        let pairs = Neighbours::new(regions.collect());
+        let apart = |a: usize, b: usize| {
+            let [x, y] = [a, b].map(|b| &self.bodies[b].casing);
+            x.apart_at(&poses[a], y, &poses[b])
+        };
+        let narrow = |(a, b): &(usize, usize)| {
+            let place = Place::Bodies(*a, *b);
+            !self.excluded.contains(*a, *b) && apart(*a, *b) <= self.between(place).2
+        };
+        let pairs = pairs.pairs().filter(narrow);
+        let pairs = pairs.map(|(a, b)| Place::Bodies(a, b));
+        self.at_walls().chain(pairs).collect()
+    }
+
+    fn film(&self, place: Place) -> Arc<Film> {
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let film = made.entry(place).or_insert_with(|| {
+            let (body, other, reach) = self.between(place);
+            let opposite = match (other, place) {
+                (Side::Wall(_), Place::Wall(w, _)) => &self.walls[w].plane,
+                (Side::Body(b), _) | (_, Place::Bodies(_, b)) => &self.bodies[b].opposite,
+            };
+            let between = (self.bodies[body].surface.clone(), opposite.clone());
+            Arc::new(Film::new(body, other, between, reach, &self.shares))
+        });
+        film.clone()
     }
 
     /// The films at the poses, for a basis of body-frame twists; none of gaps that are wide. `names` are those of the bodies, for messages.
@@ -162,16 +201,19 @@ impl Films {
         poses: &[Pose],
         basis: &DMatrix<f64>,
         names: &[String],
-    ) -> Result<PlacedFilms<'_>> {
+    ) -> Result<PlacedFilms> {
+        let near = self.near(poses);
+        // Where all are far nobody needs to be woken.
+        if near.is_empty() {
+            return Ok(PlacedFilms::default());
+        }
+        let films: Vec<_> = near.into_iter().map(|place| self.film(place)).collect();
         let place = |film| {
             let placed = PlacedFilm::new(film, poses, basis);
             placed.map_err(|distance| touching(film, distance, names))
         };
-        // Where all are far nobody needs to be woken.
-        if self.0.iter().all(|film| film.is_far(poses)) {
-            return Ok(PlacedFilms(self.0.iter().map(|_| None).collect()));
-        }
-        Ok(PlacedFilms(in_order(self.0.par_iter().map(place))?))
+        let placed = in_order(films.par_iter().map(place))?;
+        Ok(PlacedFilms(placed.into_iter().flatten().collect()))
     }
 
     /// What films add to the impulses of body-frame twists, 6·bodies × columns, at density 1.
@@ -205,37 +247,41 @@ fn touching(film: &Film, value: f64, names: &[String]) -> Error {
     }
 }
 
-/// All films at given poses, by their numbers; none where the gap is wide.
+/// The films at given poses, of all gaps that are narrow.
 #[derive(Default)]
-pub(crate) struct PlacedFilms<'a>(Vec<Option<PlacedFilm<'a>>>);
+pub(crate) struct PlacedFilms(Vec<PlacedFilm>);
 
-impl<'a> PlacedFilms<'a> {
+impl PlacedFilms {
     /// Whether there is one.
     pub fn any(&self) -> bool {
-        self.0.iter().any(Option::is_some)
+        !self.0.is_empty()
+    }
+
+    /// Each.
+    pub fn iter(&self) -> impl Iterator<Item = &PlacedFilm> {
+        self.0.iter()
     }
 
     /// What holds the points of `source`, or of its image, off the body that sees them, if anything does.
     pub fn apart(&self, target: usize, source: usize, image: &Image) -> Option<Apart> {
-        let of = |(number, placed): (usize, &Option<PlacedFilm>)| {
-            Apart::of(number, placed.as_ref()?.film, (target, source), image)
+        let of = |(number, placed): (usize, &PlacedFilm)| {
+            Apart::of(number, &placed.film, (target, source), image)
         };
         self.0.iter().enumerate().find_map(of)
     }
 
     /// The film that holds something apart.
-    pub fn of(&self, apart: &Apart) -> Option<&PlacedFilm<'a>> {
-        self.0[apart.film].as_ref()
+    pub fn of(&self, apart: &Apart) -> Option<&PlacedFilm> {
+        self.0.get(apart.film)
     }
 
-    fn each<T: Send>(&self, of: impl Fn(&PlacedFilm<'a>) -> T + Sync) -> Vec<(&PlacedFilm<'a>, T)> {
-        let films: Vec<_> = self.0.iter().flatten().collect();
-        films.into_par_iter().map(|film| (film, of(film))).collect()
+    fn each<T: Send>(&self, of: impl Fn(&PlacedFilm) -> T + Sync) -> Vec<(&PlacedFilm, T)> {
+        self.0.par_iter().map(|film| (film, of(film))).collect()
     }
 
     /// Adds the impulses of the twists in the columns, body frames.
     pub fn add_impulses(&self, twists: &DMatrix<f64>, out: &mut DMatrix<f64>) {
-        let films = self.0.iter().flatten();
+        let films = self.0.iter();
         films.for_each(|film| film.add_impulses(twists, out));
     }
 
@@ -269,8 +315,7 @@ impl<'a> PlacedFilms<'a> {
 
     /// The films along spatial displacements of the bodies.
     pub fn along(&self, z: &[Vec6]) -> MovingFilms<'_> {
-        let all = self.0.par_iter();
-        MovingFilms(all.map(|film| film.as_ref()?.along(z)).collect())
+        MovingFilms(self.0.par_iter().map(|film| film.along(z)).collect())
     }
 }
 

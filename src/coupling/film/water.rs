@@ -56,7 +56,7 @@ struct Potentials {
     rate: Vec<[f64; 2]>,
 }
 
-impl PlacedFilm<'_> {
+impl PlacedFilm {
     /// For body-frame twists, 6·bodies, and their rates; where those aren't given nothing has any.
     fn water(
         &self,

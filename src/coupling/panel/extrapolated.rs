@@ -245,7 +245,7 @@ impl HeldApart for ExtrapolatedPanels {
         &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-        films: &Arc<PlacedFilms<'a>>,
+        films: &Arc<PlacedFilms>,
     ) -> Result<Box<dyn Linearised + 'a>> {
         let fine = self.fine.linearise_held(poses, basis, films)?;
         let coarse = self.coarse.linearise_held(poses, basis, films)?;

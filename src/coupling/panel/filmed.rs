@@ -6,7 +6,7 @@
 use super::PanelCoupled;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
-use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
+use crate::coupling::film::{FilmBody, Films, PlacedFilms, Shares};
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
     Pullback, ShapeTerm, SurfacePotential, Tangent, surface,
@@ -52,7 +52,7 @@ pub(super) trait HeldApart: Coupling {
         &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-        films: &Arc<PlacedFilms<'a>>,
+        films: &Arc<PlacedFilms>,
     ) -> Result<Box<dyn Linearised + 'a>>;
 
     /// As [`Coupling::surface_potentials`] on the own panels, of those; what films have themselves isn't in them.
@@ -93,7 +93,7 @@ impl FilmedPanels {
         let bodies = FilmBody::all(surfaces, |_| SPLITS, same);
         let reach = |body: &Arc<PanelBoundary>| REACH * edge(body);
         let reaches: Vec<f64> = model.bodies.iter().map(reach).collect();
-        let mut films = Films::new(&bodies, &reaches, &SHARES, walls)?;
+        let mut films = Films::new(bodies, reaches, &SHARES, walls)?;
         films.exclude(&model.excluded);
         Ok(Self {
             names: model.bodies.iter().map(|b| b.name.clone()).collect(),
@@ -109,15 +109,12 @@ impl FilmedPanels {
         self
     }
 
-    /// Where there may be films.
-    ///
-    /// # Errors
-    /// A wall without normal.
-    pub(crate) fn film_extents(&self, walls: &[Wall]) -> Result<Vec<Extent>> {
-        self.films.extents(walls)
+    /// All films that there may be.
+    pub(crate) fn films(&self) -> &Films {
+        &self.films
     }
 
-    fn placed(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Arc<PlacedFilms<'_>>> {
+    fn placed(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Arc<PlacedFilms>> {
         self.panels.panels().model().check_input(poses, basis)?;
         Ok(Arc::new(self.films.place(poses, basis, &self.names)?))
     }
@@ -232,7 +229,7 @@ impl Linearise for FilmedPanels {
 /// [`FilmedPanels`] at given poses.
 struct FilmedLinearised<'a> {
     held: Box<dyn Linearised + 'a>,
-    films: Arc<PlacedFilms<'a>>,
+    films: Arc<PlacedFilms>,
     basis: DMatrix<f64>,
     momenta: DMatrix<f64>,
 }

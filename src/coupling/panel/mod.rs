@@ -130,7 +130,7 @@ impl PanelCoupled {
         &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-        films: &Arc<PlacedFilms<'a>>,
+        films: &Arc<PlacedFilms>,
     ) -> Result<(Box<dyn CoupledResponse + 'a>, f64)> {
         if let Some(backend) = self.backend.as_ref().filter(|_| !films.any()) {
             self.model.check_walls(poses)?;
@@ -146,7 +146,7 @@ impl PanelCoupled {
         &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-        films: &Arc<PlacedFilms<'a>>,
+        films: &Arc<PlacedFilms>,
     ) -> Result<Solved<dyn CoupledResponse + 'a>> {
         let model = self.model();
         model.check_input(poses, basis)?;
@@ -281,7 +281,7 @@ impl HeldApart for PanelCoupled {
         &'a self,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-        films: &Arc<PlacedFilms<'a>>,
+        films: &Arc<PlacedFilms>,
     ) -> Result<Box<dyn Linearised + 'a>> {
         let linearised = self.solved(poses, basis, films)?.linearise()?;
         Ok(Box::new(linearised.with_shapes(self.shape_parameters())))

@@ -21,7 +21,7 @@ pub(super) struct PlacedPanels<'a> {
     /// Panels of the target, points of the source: all whose relative placement changes.
     pub pairs: Vec<Pair>,
     /// What holds some of them apart.
-    pub films: Arc<PlacedFilms<'a>>,
+    pub films: Arc<PlacedFilms>,
     pub system: System<'a>,
     /// S F of the unit twists of each body that the first twists move, at all points.
     readout: Vec<Option<Columns>>,
@@ -48,7 +48,7 @@ impl<'a> PlacedPanels<'a> {
     pub fn new(
         coupled: &'a PanelModel,
         poses: &[Pose],
-        films: &Arc<PlacedFilms<'a>>,
+        films: &Arc<PlacedFilms>,
         twists: &DMatrix<f64>,
     ) -> Result<Self> {
         let system = System::new(coupled, poses, films)?;

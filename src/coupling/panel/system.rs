@@ -28,7 +28,7 @@ const GROUP: usize = 128;
 struct Placed<'a> {
     coupled: &'a PanelModel,
     poses: &'a [Pose],
-    films: &'a PlacedFilms<'a>,
+    films: &'a PlacedFilms,
 }
 
 /// A = ½I + Ω/4π at given poses.

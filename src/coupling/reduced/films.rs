@@ -1,8 +1,8 @@
 //! Which films there are, and from which gap on they carry what the sources don't resolve.
 
-use super::{Reduced, compress};
+use super::{Reduced, ReducedBody, compress};
 use crate::adjoint::lie::Pose;
-use crate::coupling::film::{Extent, FilmBody, Films, PlacedFilms, Shares};
+use crate::coupling::film::{FilmBody, Films, PlacedFilms, Shares};
 use crate::geometry::{Solid, TriMesh, Wall};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -22,65 +22,71 @@ const SHARES: Shares = Shares {
     in_corners: true,
 };
 
+/// The films in the gaps between compressed bodies, and to rigid walls, that their sources don't resolve: from the surface of each body in its own frame, and its shape by
+/// formula where it has one, and the tolerance to which it was compressed.
+///
+/// # Errors
+/// [`Error::Input`] if there isn't one surface and tolerance for each body, or for a wall without normal.
+pub(crate) fn films(
+    bodies: &[Arc<ReducedBody>],
+    surfaces: &[(&TriMesh, Option<&Solid>)],
+    tolerances: &[f64],
+    walls: &[Wall],
+) -> Result<Films> {
+    let count = bodies.len();
+    for (what, given) in [
+        ("films: surfaces", surfaces.len()),
+        ("films: tolerances", tolerances.len()),
+    ] {
+        if given != count {
+            let expected = format!("give one for each of {count} bodies");
+            return Err(Error::input(what, given, expected));
+        }
+    }
+    let same = |a: usize, b: usize| Arc::ptr_eq(&bodies[a], &bodies[b]);
+    let finer =
+        |b: usize| (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
+    // A film between round bodies is as good as its faces are small against the gap.
+    let splits = |b: usize| {
+        let third = |splits: &usize| finer(b) < 1.01 / 3f64.powi(*splits as i32);
+        (1..=SPLITS).take_while(third).count()
+    };
+    let seen = FilmBody::all(surfaces, splits, same);
+    let reach = |b: usize| {
+        let fit = &bodies[b].parts().fit;
+        // Sources of a smaller tolerance are right in narrower gaps, and more than films are.
+        let finer = finer(b);
+        REACH * seen[b].surface.flatness * fit.finest() * finer.powf(FINER)
+    };
+    let reaches = (0..count).map(reach).collect();
+    Films::new(seen, reaches, &SHARES, walls)
+}
+
 impl Reduced {
-    /// The same with films in the gaps between bodies, and to rigid walls, that the sources don't resolve: from the surface of each body in its own frame, and its
-    /// shape by formula where it has one, and the tolerance to which it was compressed.
+    /// The same with [`films`].
     ///
     /// # Errors
-    /// [`Error::Input`] if there isn't one surface and tolerance for each body, or for a wall without normal.
+    /// As there.
     pub fn with_films(
         mut self,
         surfaces: &[(&TriMesh, Option<&Solid>)],
         tolerances: &[f64],
         walls: &[Wall],
     ) -> Result<Self> {
-        let count = self.bodies.len();
-        for (what, given) in [
-            ("films: surfaces", surfaces.len()),
-            ("films: tolerances", tolerances.len()),
-        ] {
-            if given != count {
-                let expected = format!("give one for each of {count} bodies");
-                return Err(Error::input(what, given, expected));
-            }
-        }
-        let same = |a: usize, b: usize| Arc::ptr_eq(&self.bodies[a], &self.bodies[b]);
-        let finer =
-            |b: usize| (tolerances[b] / compress::CompressSettings::default().tolerance).min(1.0);
-        // A film between round bodies is as good as its faces are small against the gap.
-        let splits = |b: usize| {
-            let third = |splits: &usize| finer(b) < 1.01 / 3f64.powi(*splits as i32);
-            (1..=SPLITS).take_while(third).count()
-        };
-        let bodies = FilmBody::all(surfaces, splits, same);
-        let reach = |b: usize| {
-            let fit = &self.bodies[b].parts().fit;
-            // Sources of a smaller tolerance are right in narrower gaps, and more than films are.
-            let finer = finer(b);
-            REACH * bodies[b].surface.flatness * fit.finest() * finer.powf(FINER)
-        };
-        let reaches: Vec<f64> = (0..count).map(reach).collect();
-        self.films = Films::new(&bodies, &reaches, &SHARES, walls)?;
+        self.films = films(&self.bodies, surfaces, tolerances, walls)?;
         Ok(self)
     }
 
-    /// Where there may be films.
-    ///
-    /// # Errors
-    /// A wall without normal.
-    pub(crate) fn film_extents(&self, walls: &[Wall]) -> Result<Vec<Extent>> {
-        self.films.extents(walls)
+    /// All films that there may be.
+    pub(crate) fn films(&self) -> &Films {
+        &self.films
     }
 
     /// The films at the poses, for a basis of body-frame twists.
     ///
     /// # Errors
     /// Bodies that touch.
-    pub(super) fn placed_films(
-        &self,
-        poses: &[Pose],
-        basis: &DMatrix<f64>,
-    ) -> Result<PlacedFilms<'_>> {
+    pub(super) fn placed_films(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<PlacedFilms> {
         self.films.place(poses, basis, &self.names)
     }
 

@@ -1,10 +1,11 @@
 //! One evaluation of the reduced coupling: value and first derivative. What a value costs is all that the derivatives need.
 
 use super::Reduced;
-use super::link::{Link, PlacedSkeletons};
-use super::views::{FLUX, interleave, view, view_mut};
+use super::link::Link;
+use super::placed::PlacedSkeletons;
+use super::views::{FLUX, view, view_mut};
 use crate::Result;
-use crate::adjoint::kernel::{Points, potential_sum, potential_vjp};
+use crate::adjoint::kernel::{Points, potential_vjp};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, linear, point_wrench};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::PlacedFilms;
@@ -17,7 +18,7 @@ use crate::coupling::{
 use crate::solver::Cholesky;
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, OnceLock};
 
@@ -32,7 +33,7 @@ pub(super) struct ReducedLinearised<'a> {
     pub poses: Vec<Pose>,
     pub placed: Vec<PlacedSkeletons<'a>>,
     /// Of the gaps.
-    pub films: PlacedFilms<'a>,
+    pub films: PlacedFilms,
     /// Of I − LᵀGL.
     pub factor: Cholesky,
     /// LᵀGŪ, modes × 6 bodies.
@@ -65,23 +66,12 @@ pub(super) struct ReducedResponse {
     pub alpha: DVector<f64>,
 }
 
-impl ReducedResponse {
-    /// Charges alone.
-    pub fn of_charges(alpha: DVector<f64>) -> Self {
-        Self {
-            twists: DVector::zeros(0),
-            a: DVector::zeros(0),
-            alpha,
-        }
-    }
-}
-
 impl<'a> ReducedLinearised<'a> {
     pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
         let films = reduced.placed_films(poses, basis)?;
         let place = |link: &'a Link| {
             let placed = link.place(&reduced.bodies, poses, &films)?;
-            let block = block(reduced, &placed);
+            let block = placed.block(&reduced.bodies);
             Some((placed, block))
         };
         let (placed, blocks): (Vec<_>, Vec<_>) =
@@ -208,50 +198,18 @@ impl<'a> ReducedLinearised<'a> {
         (alpha, FLUX * (direct + self.solution.tr_mul(&a)))
     }
 
-    /// Adds the wrench of a link and of what holds it apart, of which the first part of the wrench is by forces on the points.
-    pub fn apply(&self, placed: &PlacedSkeletons, wrench: &Vec6, force: &Vec3, out: &mut [Vec6]) {
-        placed
-            .pair
-            .apply(&self.poses[placed.link.target], wrench, out);
-        if let Some((apart, film)) = placed.pair.film(&self.films) {
-            film.apply(&apart.wrench(film, force), out);
-        }
-    }
-
     /// 4π α_xᵀ δG α_y: the Coulomb forces among the charges, as a wrench on each body.
     fn pull_back(&self, x: &[f64], y: &[f64]) -> Vec<Vec6> {
         let one = |placed: &PlacedSkeletons| -> (Vec6, Vec3) {
-            let link = placed.link;
-            let (t, s) = (self.range(link.target), self.range(link.source));
-            // Equal charges need one field.
-            let same = x == y;
-            let columns = if same { 1 } else { 2 };
-            let bar = interleave(&[&x[t.clone()], &y[t.clone()]][..columns]);
-            let n = s.len();
-            let (x, y) = (&x[s.clone()], &y[s]);
-            let mut field = vec![0.0; 3 * columns * n];
-            let (targets, sources) = (self.targets(placed), &placed.pair.points);
-            potential_vjp(targets, sources, &bar, columns, &mut field);
-            let strength = FLUX * link.factor;
-            let last = columns - 1;
-            let mut total = wrench(&placed.pair.positions, |j| {
-                let at = |k| vector(&field, columns, j, k);
-                strength * placed.weight[0] * (at(0) * y[j] + at(last) * x[j])
-            });
-            let force = linear(&total);
-            if placed.fading() {
-                let p = self.sums(placed, &bar, columns);
-                let of = |j: usize| p[columns * j] * y[j] + p[columns * j + last] * x[j];
-                let energy: f64 = (0..n).map(of).sum();
-                let force = placed.between.normalize() * (strength * placed.weight[1] * energy);
-                total += point_wrench(&placed.centre, &force);
-            }
-            (total, force)
+            let ends = [placed.link.target, placed.link.source];
+            let [t, s] = ends.map(|b| self.range(b));
+            let (at_target, at_source) = ([&x[t.clone()], &y[t]], [&x[s.clone()], &y[s]]);
+            placed.pull_back(&self.reduced.bodies, at_target, at_source)
         };
         let wrenches = self.reduced.over(&self.placed, PULL, one);
         let mut out = vec![Vec6::zeros(); self.reduced.bodies.len()];
         for (placed, (wrench, force)) in self.placed.iter().zip(&wrenches) {
-            self.apply(placed, wrench, force, &mut out);
+            placed.apply(&self.poses, &self.films, (wrench, force), &mut out);
         }
         out
     }
@@ -265,7 +223,7 @@ impl<'a> ReducedLinearised<'a> {
                 let mut field = vec![0.0; 3 * columns * s.len()];
                 potential_vjp(self.targets(placed), s, own.as_slice(), columns, &mut field);
                 let sums = match placed.fading() {
-                    true => self.sums(placed, own.as_slice(), columns),
+                    true => placed.sums(&self.reduced.bodies, own.as_slice(), columns),
                     false => Vec::new(),
                 };
                 Fields { field, sums }
@@ -305,7 +263,7 @@ impl<'a> ReducedLinearised<'a> {
                     let force = placed.between.normalize() * slope;
                     total += point_wrench(&placed.centre, &force);
                 }
-                self.apply(placed, &total, &pushed, out);
+                placed.apply(&self.poses, &self.films, (&total, &pushed), out);
             }
         }
         self.films.add_column_wrenches(x, &mut out);
@@ -320,30 +278,6 @@ impl<'a> ReducedLinearised<'a> {
     /// Points of body `b`.
     pub fn range(&self, b: usize) -> std::ops::Range<usize> {
         self.reduced.points[b].clone()
-    }
-
-    /// `[j][k]: Σ_i bar[i][k] P_ij`.
-    pub fn sums(&self, placed: &PlacedSkeletons, bar: &[f64], columns: usize) -> Vec<f64> {
-        let mut out = vec![0.0; columns * placed.pair.points.len()];
-        let (targets, sources) = (self.targets(placed), &placed.pair.points);
-        potential_sum(targets, sources, bar, columns, &mut out);
-        out
-    }
-}
-
-/// [L, Ū]ᵀ P [L, Ū] of a link: (modes + 6) × (modes + 6).
-fn block(reduced: &Reduced, placed: &PlacedSkeletons) -> Mat<f64> {
-    let link = placed.link;
-    let (target, source) = (&reduced.bodies[link.target], &reduced.bodies[link.source]);
-    let p = placed.potentials(&reduced.bodies);
-    let p = MatRef::from_row_major_slice(&p, target.points(), source.points());
-    let (left, right) = (view(target.basis()), view(source.basis()));
-    let (m, n) = (left.ncols(), right.ncols());
-    // The cheaper order of the two products.
-    if target.points() * n <= source.points() * m {
-        left.transpose() * (p * right)
-    } else {
-        (left.transpose() * p) * right
     }
 }
 

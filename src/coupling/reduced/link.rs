@@ -1,7 +1,7 @@
 //! The blocks of G: a body and the image of another, or of itself.
 
 use super::ReducedBody;
-use crate::adjoint::kernel::{Write, potential_fill};
+use super::placed::PlacedSkeletons;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::Pair;
@@ -54,17 +54,6 @@ pub struct Link {
     /// How often the block counts in `α_xᵀGα_y`, written `Σ_ij P_ij (x_i y_j + y_i x_j)`: 1 between
     /// different bodies, ½ within one; negative for images of opposite sign.
     pub factor: f64,
-}
-
-/// A link at given poses.
-pub(super) struct PlacedSkeletons<'a> {
-    pub link: &'a Link,
-    pub pair: Pair,
-    /// The source body's centre in the target's frame, less the target's.
-    pub between: Vec3,
-    pub centre: Vec3,
-    /// Weight at the present distance, with two derivatives.
-    pub weight: [f64; 3],
 }
 
 impl Link {
@@ -122,7 +111,7 @@ impl Link {
     }
 
     /// The link at the poses, unless it has faded out.
-    pub(super) fn place(
+    pub(in crate::coupling) fn place(
         &self,
         bodies: &[Arc<ReducedBody>],
         poses: &[Pose],
@@ -138,22 +127,6 @@ impl Link {
             centre,
             weight,
         })
-    }
-}
-
-impl PlacedSkeletons<'_> {
-    /// P, target points × source points, row-major.
-    pub fn potentials(&self, bodies: &[Arc<ReducedBody>]) -> Vec<f64> {
-        let targets = bodies[self.link.target].targets();
-        let stride = self.pair.points.len();
-        let mut out = vec![0.0; targets.len() * stride];
-        potential_fill(targets, &self.pair.points, Write::Set, &mut out, stride, 0);
-        out
-    }
-
-    /// Whether the weight changes at this distance.
-    pub fn fading(&self) -> bool {
-        self.weight[1] != 0.0 || self.weight[2] != 0.0
     }
 }
 

@@ -1,8 +1,8 @@
 //! First and second derivatives along many directions at once: what doesn't depend on the direction is summed up once.
 
 use super::linearised::{PULL, ReducedLinearised};
-use super::link::PlacedSkeletons;
-use super::second::{Moved, PointTangent, TANGENT};
+use super::placed::{Moved, PlacedSkeletons, PointTangent};
+use super::second::TANGENT;
 use super::views::{FLUX, view_mut};
 use crate::adjoint::kernel::{potential_hvp, potential_jvp, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, angular, linear, point_wrench};
@@ -58,7 +58,8 @@ impl ReducedLinearised<'_> {
             let mut field = vec![0.0; 3 * columns * s.len()];
             let (targets, sources) = (self.targets(placed), &placed.pair.points);
             potential_vjp(targets, sources, bar.as_slice(), columns, &mut field);
-            let sums = (placed.fading()).then(|| self.sums(placed, bar.as_slice(), columns));
+            let sums = (placed.fading())
+                .then(|| placed.sums(&self.reduced.bodies, bar.as_slice(), columns));
             let strength = FLUX * link.factor;
             let charge = |j: usize, k: usize| both[(s.start + j, k)];
             let of = |k: usize| {
@@ -86,7 +87,7 @@ impl ReducedLinearised<'_> {
         let mut out = vec![vec![Vec6::zeros(); self.reduced.bodies.len()]; count];
         for (placed, wrenches) in self.placed.iter().zip(&wrenches) {
             for ((wrench, force), out) in wrenches.iter().zip(&mut out) {
-                self.apply(placed, wrench, force, out);
+                placed.apply(&self.poses, &self.films, (wrench, force), out);
             }
         }
         out
@@ -157,7 +158,7 @@ impl ReducedLinearised<'_> {
         let moved = z
             .iter()
             .zip(films)
-            .map(|(z, films)| self.moved(placed, z, films));
+            .map(|(z, films)| placed.moved(&self.poses, z, films));
         let moved: Vec<Moved> = moved.collect();
         let [w, dw, _] = placed.weight.map(|w| link.factor * w);
         let mut on_target = DMatrix::zeros(t.len(), z.len());
@@ -197,7 +198,7 @@ impl ReducedLinearised<'_> {
         }
     }
 
-    /// [`ReducedLinearised::link_tangent`] along all displacements.
+    /// [`PlacedSkeletons::tangent`] along all displacements.
     fn link_tangents(
         &self,
         placed: &PlacedSkeletons,
@@ -212,8 +213,11 @@ impl ReducedLinearised<'_> {
         let (targets, points) = (self.targets(placed), &placed.pair.points);
         potential_vjp(targets, points, changes.as_slice(), count, &mut changed);
         let sums = placed.fading().then(|| {
-            let own = self.sums(placed, &alpha.as_slice()[t.clone()], 1);
-            (own, self.sums(placed, changes.as_slice(), count))
+            let own = placed.sums(&self.reduced.bodies, &alpha.as_slice()[t.clone()], 1);
+            (
+                own,
+                placed.sums(&self.reduced.bodies, changes.as_slice(), count),
+            )
         });
         let each = bent.moved.iter().enumerate().map(|(k, moved)| {
             let of = |j: usize| {

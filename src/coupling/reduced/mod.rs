@@ -27,6 +27,7 @@ mod films;
 mod linearised;
 mod link;
 mod many;
+mod placed;
 mod region;
 mod resolved;
 mod second;
@@ -36,7 +37,9 @@ mod surface;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
+pub(crate) use films::films;
 pub use link::{Cutoff, Link};
+pub(in crate::coupling) use placed::{Charge, Moved, PlacedSkeletons};
 pub use region::Region;
 pub use slope::ShapeSlope;
 pub(super) use views::FLUX;

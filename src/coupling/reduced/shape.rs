@@ -9,8 +9,8 @@
 //! at fixed poses and twists: no further solve. Its slope along a displacement of the bodies takes the tangents of α, β and ∇β, which the second derivative solves for as well.
 
 use super::linearised::ReducedLinearised;
-use super::link::PlacedSkeletons;
-use super::second::Moved;
+use super::placed::Moved;
+use super::placed::PlacedSkeletons;
 use super::slope::ShapeSlope;
 use super::views::FLUX;
 use crate::Result;

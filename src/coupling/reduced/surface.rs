@@ -1,8 +1,8 @@
 //! The transpose of the potentials on the bodies' surfaces.
 
-use super::linearised::{ReducedLinearised, ReducedResponse};
+use super::linearised::ReducedLinearised;
 use super::link::Link;
-use super::second::PointTangent;
+use super::placed::PointTangent;
 use super::views::FLUX;
 use crate::Result;
 use crate::adjoint::lie::Vec6;
@@ -53,7 +53,7 @@ impl ReducedLinearised<'_> {
                 continue;
             };
             let (t, s) = (link.target, self.range(link.source));
-            let moved = self.moved(&placed, z, &films);
+            let moved = placed.moved(&self.poses, z, &films);
             let [weight, slope, _] = placed.weight.map(|w| link.image.sign * w);
             let mut own = beta.part(&s);
             let pulled = pull(
@@ -81,9 +81,8 @@ impl ReducedLinearised<'_> {
         bar.twists += twists.column(0) / FLUX;
         let rate = DVector::from_vec(strengths.column(1));
         let changes = DMatrix::from_columns(&[of_values.column(0).into_owned(), rate]);
-        let responses = [of_rates, alpha].map(ReducedResponse::of_charges);
         for (placed, kept) in self.placed.iter().zip(&kept) {
-            let ([w, dw], _) = self.link_tangent(placed, kept, &responses, &changes);
+            let ([w, dw], _) = self.link_tangent(placed, kept, &charges, &changes);
             let (t, [w, dw]) = (placed.link.target, [w, dw].map(|w| w / FLUX));
             let pose = &self.poses[t];
             placed.pair.apply(pose, &w, &mut gradient);

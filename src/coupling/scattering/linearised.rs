@@ -60,7 +60,9 @@ impl<'a> Scattered<'a> {
 impl Displaced<'_, '_> {
     /// What the displacement alone asks of bodies whose twists stay as they are: in the equations of [`Scattered::recoil`], and as impulses (body frames, unit density).
     pub fn asked(&self) -> (Vec<f64>, DVector<f64>) {
-        let (modes, impulses) = self.at.projected(&self.seen);
+        let (modes, mut impulses) = self.at.projected(&self.seen);
+        let narrow = &self.moving.narrow;
+        narrow.add_impulse_rate(&self.answer.twists, &mut impulses);
         let unit = FLUX.sqrt();
         (modes.into_iter().map(|a| unit * a).collect(), impulses)
     }
@@ -68,39 +70,38 @@ impl Displaced<'_, '_> {
     /// [`Linearised::carried`] as the twists change at the rates `twists`, which recoiled so.
     pub fn carried(&self, twists: &DVector<f64>, recoiled: &Recoiled) -> Carried {
         let rates = self.at.charges(twists, recoiled.modes());
-        carried(self.at, &self.moving, &self.answer.charges, twists, &rates)
+        carried(self.at, &self.moving, &self.answer, twists, &rates)
     }
 }
 
-/// Of charges with themselves, as bodies are displaced and charges change at these rates, those of the twists among them.
+/// Of an answer with itself, as bodies are displaced and charges change at these rates, those of the twists among them.
 fn carried(
     at: &Scattered,
     moving: &Moving,
-    charges: &[f64],
+    answer: &Answer,
     twists: &DVector<f64>,
     rates: &[f64],
 ) -> Carried {
-    let Bent {
-        mut impulses,
-        gradient,
-        rate,
-    } = bent(at, moving, charges, rates);
-    at.add_own(twists, &mut impulses);
+    let mut out = bent(at, moving, &answer.charges, rates);
+    out.add_films(moving, &answer.twists);
+    at.add_own(twists, &mut out.impulses);
+    at.narrow.add_impulses(twists, &mut out.impulses);
+    let mut wrench: Vec<_> = out.rate.into_iter().map(|w| 0.5 * w).collect();
+    at.narrow.add_wrenches(twists, &answer.twists, &mut wrench);
     Carried {
-        momentum: impulses,
-        wrench: rate.into_iter().map(|w| 0.5 * w).collect(),
-        gradient,
+        momentum: out.impulses,
+        wrench,
+        gradient: out.gradient,
     }
 }
 
 /// The same without what the twists do of each body alone.
 fn bent(at: &Scattered, moving: &Moving, charges: &[f64], rates: &[f64]) -> Bent {
     let found = at.gradient_jvp(moving, charges, rates);
-    let scaled = |w: Vec<Vec6>| w.into_iter().map(|w| 2.0 * FLUX * w).collect();
     Bent {
         impulses: at.impulses_of(&found.potentials),
-        gradient: scaled(found.gradient),
-        rate: scaled(found.rate),
+        gradient: found.gradient,
+        rate: found.rate,
     }
 }
 
@@ -109,6 +110,15 @@ struct Bent {
     impulses: DVector<f64>,
     gradient: Vec<Vec6>,
     rate: Vec<Vec6>,
+}
+
+impl Bent {
+    /// Adds what films have themselves, of twists that stay as they are.
+    fn add_films(&mut self, moving: &Moving, twists: &DVector<f64>) {
+        let wrenches = (&mut self.gradient[..], &mut self.rate[..]);
+        let impulses = std::slice::from_mut(&mut self.impulses);
+        (moving.narrow).add_tangent(&[twists], wrenches, impulses);
+    }
 }
 
 impl<'a> ScatteredLinearised<'a> {
@@ -159,11 +169,21 @@ impl<'a> ScatteredLinearised<'a> {
         bent(at, moving, charges, &rates)
     }
 
-    /// The rate of the impulses to charges as bodies are displaced.
-    fn impulse_rate(&self, charges: &[f64], z: &[Vec6]) -> DVector<f64> {
+    /// The rate of the impulses of an answer as bodies are displaced.
+    fn impulse_rate(&self, answer: &Answer, z: &[Vec6]) -> DVector<f64> {
         let at = &self.at;
         let moving = at.moving(z);
-        at.impulses_answered(&at.tangent_potentials(&moving, charges))
+        let seen = at.tangent_potentials(&moving, &answer.charges);
+        let mut out = at.impulses_answered(&seen);
+        moving.narrow.add_impulse_rate(&answer.twists, &mut out);
+        out
+    }
+
+    /// ∇E of two answers.
+    fn pull_back(&self, x: &Answer, y: &Answer) -> Vec<Vec6> {
+        let mut out = self.at.pull_back(&x.charges, &y.charges);
+        self.at.narrow.add_wrenches(&x.twists, &y.twists, &mut out);
+        out
     }
 }
 
@@ -177,14 +197,14 @@ impl Linearised for ScatteredLinearised<'_> {
             self.respond(&Direction::Basis(x)),
             self.respond(&Direction::Basis(y)),
         );
-        let out = self.at.pull_back(&a.charges, &b.charges);
+        let out = self.pull_back(&a, &b);
         self.at.check()?;
         Ok(out)
     }
 
     fn gradient_along(&self, y: &DVector<f64>, z: &[Vec6]) -> Result<DVector<f64>> {
         let answer = self.respond(&Direction::Basis(y));
-        let rate = self.impulse_rate(&answer.charges, z);
+        let rate = self.impulse_rate(&answer, z);
         self.at.check()?;
         Ok(self.at.motions.transposed(&rate))
     }
@@ -194,7 +214,7 @@ impl Linearised for ScatteredLinearised<'_> {
         let out = Pullback {
             momentum_x: self.at.impulses(&x),
             momentum_y: self.at.impulses(&y),
-            wrench: self.at.pull_back(&x.charges, &y.charges),
+            wrench: self.pull_back(&x, &y),
         };
         self.at.check()?;
         Ok(out)
@@ -212,7 +232,7 @@ impl Linearised for ScatteredLinearised<'_> {
         let seen = at.tangent_potentials(&moving, &answer.charges);
         // Charges that the twists ask for, and those that answer the displacement, in one solve.
         let rates = at.answering_beside(twists, &seen);
-        let found = carried(at, &moving, &answer.charges, twists, &rates);
+        let found = carried(at, &moving, &answer, twists, &rates);
         at.check()?;
         Ok(Some(found))
     }
@@ -222,7 +242,8 @@ impl Linearised for ScatteredLinearised<'_> {
         let moving = at.moving(z);
         let (x, y) = (self.respond(&x), self.respond(&y));
         let out = if x.charges == y.charges {
-            let bent = self.bent(&moving, &x.charges);
+            let mut bent = self.bent(&moving, &x.charges);
+            bent.add_films(&moving, &x.twists);
             Tangent {
                 momentum_x: bent.impulses.clone(),
                 momentum_y: bent.impulses,
@@ -232,12 +253,18 @@ impl Linearised for ScatteredLinearised<'_> {
         } else {
             let [sum, difference] =
                 [1.0, -1.0].map(|sign| self.bent(&moving, &plus(&x.charges, sign, &y.charges)));
-            Tangent {
+            let mut out = Tangent {
                 momentum_x: 0.5 * (&sum.impulses + &difference.impulses),
                 momentum_y: 0.5 * (&sum.impulses - &difference.impulses),
                 gradient: mixed(&sum.gradient, &difference.gradient),
                 wrench: mixed(&sum.rate, &difference.rate),
-            }
+            };
+            let mut impulses = [out.momentum_x, out.momentum_y];
+            let wrenches = (&mut out.gradient[..], &mut out.wrench[..]);
+            let twists = [&x.twists, &y.twists];
+            (moving.narrow).add_tangent(&twists, wrenches, &mut impulses);
+            [out.momentum_x, out.momentum_y] = impulses;
+            out
         };
         at.check()?;
         Ok(out)
@@ -280,6 +307,10 @@ impl Coupling for Scattering {
 
     fn scattering(&self) -> Option<&Scattering> {
         Some(self)
+    }
+
+    fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        Ok(Some(self.films.momenta(poses, twists, &self.names)?))
     }
 
     fn surface_potentials(

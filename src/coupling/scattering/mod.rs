@@ -29,6 +29,7 @@ mod kept;
 mod levels;
 mod linearised;
 mod mirrors;
+mod narrow;
 mod near;
 mod pairs;
 mod parts;
@@ -45,6 +46,7 @@ pub use linearised::{Displaced, ScatteredLinearised};
 pub use scattered::{Motions, Scattered};
 
 use super::Exclusions;
+use super::film::Films;
 use super::isolated::Isolated;
 use super::reduced::{Link, Reduced, ReducedBody};
 use super::settings::{end, ranges};
@@ -79,6 +81,8 @@ pub struct Scattering {
     refused: BTreeSet<[usize; 2]>,
     levels: Levels,
     table: Table,
+    /// Of gaps that the points don't resolve.
+    films: Films,
     /// Where sums are made instead of here.
     summing: Option<Arc<dyn Summing>>,
     /// Memory for the matrices of near pairs, and for what is kept of far ones.
@@ -157,6 +161,7 @@ impl Scattering {
             cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
             table: Table::new(levels.degree),
             refused: BTreeSet::new(),
+            films: Films::default(),
             summing: None,
             spare: Spare::default(),
             spare_packs: Spare::default(),
@@ -181,6 +186,12 @@ impl Scattering {
             }
         }
         Ok(self)
+    }
+
+    /// The same, with these films in gaps that the points don't resolve.
+    pub(crate) fn with_films(mut self, films: Films) -> Self {
+        self.films = films;
+        self
     }
 
     /// The same, whose sums are made elsewhere: of the same bodies between the same walls, without the same pairs.

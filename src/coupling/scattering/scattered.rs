@@ -4,6 +4,7 @@ use super::Scattering;
 use super::blocks::Blocks;
 use super::elsewhere::{Changed, SummingAt};
 use super::kept::{Answer, Kept};
+use super::narrow::{MovingNarrow, Narrow};
 use super::pairs::{Near, Pairs};
 use super::parts::of_each;
 use super::places::{Places, length, minus};
@@ -40,8 +41,15 @@ pub(super) enum Making<'s> {
     Elsewhere(&'s dyn SummingAt),
 }
 
+/// Bodies as they are displaced.
+pub(super) struct Moving<'s> {
+    places: MovingPlaces<'s>,
+    /// In narrow gaps.
+    pub narrow: MovingNarrow<'s>,
+}
+
 /// Places as bodies are displaced.
-pub(super) enum Moving<'s> {
+enum MovingPlaces<'s> {
     Here(Places<Dual64>),
     /// By spatial twists.
     Elsewhere(&'s dyn SummingAt, Vec<Vec6>),
@@ -54,6 +62,7 @@ pub struct Scattered<'a> {
     pub(super) pairs: Pairs,
     places: Places<f64>,
     making: Made,
+    pub(super) narrow: Narrow,
     pub(super) motions: Box<dyn Motions + 'a>,
     pub(super) kept: Mutex<Kept>,
 }
@@ -62,7 +71,7 @@ impl Scattering {
     /// Places the bodies.
     ///
     /// # Errors
-    /// [`Error::Input`] for another number of poses; a device that fails.
+    /// [`Error::Input`] for another number of poses; bodies with films that touch; a device that fails.
     pub fn place<'a>(
         &'a self,
         poses: &[Pose],
@@ -76,6 +85,7 @@ impl Scattering {
             ));
         }
         let places = Places::new(self, poses);
+        let narrow = self.narrow(poses)?;
         let (pairs, making) = match &self.summing {
             Some(summing) => (Pairs::default(), Made::Elsewhere(summing.place(poses)?)),
             None => {
@@ -86,6 +96,7 @@ impl Scattering {
         };
         Ok(Scattered {
             making,
+            narrow,
             pairs,
             places,
             poses: poses.to_vec(),
@@ -215,7 +226,7 @@ impl Scattered<'_> {
         of_each(model.bodies.len(), of_body).concat()
     }
 
-    /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other.
+    /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other, and the impulses of films.
     pub(super) fn exchanged(
         &self,
         making: &Making<'_>,
@@ -223,17 +234,21 @@ impl Scattered<'_> {
         modes: &[f64],
     ) -> (Vec<f64>, DVector<f64>) {
         let model = self.model;
-        let (blocks, sums) = match making {
-            Making::Here(blocks, sums) => (blocks, sums),
+        let (mut seen, mut impulses) = match making {
+            Making::Here(blocks, sums) => {
+                let points = |b: usize| model.carrier(b).is_none();
+                let numbers = self.joined(twists, modes, points);
+                self.parted(&model.numbers, &blocks.seen(sums, &numbers), points)
+            }
             Making::Elsewhere(at) => {
                 let charges = self.charges(twists, modes);
                 let seen = at.potentials(&charges);
-                return self.projected(&self.told(seen, || vec![0.0; charges.len()]));
+                self.projected(&self.told(seen, || vec![0.0; charges.len()]))
             }
         };
-        let points = |b: usize| model.carrier(b).is_none();
-        let numbers = self.joined(twists, modes, points);
-        self.parted(&model.numbers, &blocks.seen(sums, &numbers), points)
+        let into = (&mut seen[..], &mut impulses);
+        self.narrow.add_exchanged(twists, modes, into);
+        (seen, impulses)
     }
 
     /// 4π αᵀ δĜ α as spatial wrenches.
@@ -242,7 +257,9 @@ impl Scattered<'_> {
             Made::Here(blocks) => self.sums(blocks).gradient(charges).wrenches(),
             Made::Elsewhere(at) => self.told(at.gradient(charges), || self.no_wrenches()),
         };
-        found.into_iter().map(|w| 2.0 * FLUX * w).collect()
+        let mut found: Vec<_> = found.into_iter().map(|w| 2.0 * FLUX * w).collect();
+        self.narrow.add_gradient(charges, &mut found);
+        found
     }
 
     /// 4π α_xᵀ δĜ α_y as spatial wrenches.
@@ -256,47 +273,59 @@ impl Scattered<'_> {
 
     /// The places as the bodies are displaced.
     pub(super) fn moving(&self, z: &[Vec6]) -> Moving<'_> {
-        match &self.making {
-            Made::Here(_) => Moving::Here(Places::moving(self.model, &self.poses, z)),
-            Made::Elsewhere(at) => Moving::Elsewhere(at.as_ref(), z.to_vec()),
-        }
+        let places = match &self.making {
+            Made::Here(_) => MovingPlaces::Here(Places::moving(self.model, &self.poses, z)),
+            Made::Elsewhere(at) => MovingPlaces::Elsewhere(at.as_ref(), z.to_vec()),
+        };
+        let narrow = self.narrow.along(z);
+        Moving { places, narrow }
     }
 
     /// `DĜ[Z] α`.
     pub(super) fn tangent_potentials(&self, moving: &Moving, charges: &[f64]) -> Vec<f64> {
-        let places = match moving {
-            Moving::Elsewhere(at, z) => {
+        let mut out: Vec<f64> = match &moving.places {
+            MovingPlaces::Elsewhere(at, z) => {
                 let seen = at.potentials_jvp(z, charges);
-                return self.told(seen, || vec![0.0; charges.len()]);
+                self.told(seen, || vec![0.0; charges.len()])
             }
-            Moving::Here(places) => places,
+            MovingPlaces::Here(places) => {
+                let still = vec![0.0; charges.len()];
+                let sums = Sums::new(self.model, &self.pairs, places);
+                let seen = sums.potentials(&dual(charges, &still));
+                seen.iter().map(|x| x.eps).collect()
+            }
         };
-        let still = vec![0.0; charges.len()];
-        let sums = Sums::new(self.model, &self.pairs, places);
-        let seen = sums.potentials(&dual(charges, &still));
-        seen.iter().map(|x| x.eps).collect()
+        moving.narrow.add_tangent_potentials(charges, &mut out);
+        out
     }
 
-    /// The gradient of ½ αᵀ Ĝ α as bodies are displaced and the charges change.
+    /// 4π αᵀ δĜ α, and how that and what charges see change as bodies are displaced and the charges change.
     pub(super) fn gradient_jvp(&self, moving: &Moving, charges: &[f64], rates: &[f64]) -> Changed {
-        let places = match moving {
-            Moving::Elsewhere(at, z) => {
+        let mut out = match &moving.places {
+            MovingPlaces::Elsewhere(at, z) => {
                 let none = || Changed {
                     potentials: vec![0.0; charges.len()],
                     gradient: self.no_wrenches(),
                     rate: self.no_wrenches(),
                 };
-                return self.told(at.gradient_jvp(z, charges, rates), none);
+                self.told(at.gradient_jvp(z, charges, rates), none)
             }
-            Moving::Here(places) => places,
+            MovingPlaces::Here(places) => {
+                let sums = Sums::new(self.model, &self.pairs, places);
+                let found = sums.gradient(&dual(charges, rates));
+                let [gradient, rate] = found.wrenches_and_rates();
+                Changed {
+                    potentials: found.potentials.iter().map(|x| x.eps).collect(),
+                    gradient,
+                    rate,
+                }
+            }
         };
-        let found = Sums::new(self.model, &self.pairs, places).gradient(&dual(charges, rates));
-        let [gradient, rate] = found.wrenches_and_rates();
-        Changed {
-            potentials: found.potentials.iter().map(|x| x.eps).collect(),
-            gradient,
-            rate,
+        for wrench in out.gradient.iter_mut().chain(&mut out.rate) {
+            *wrench *= 2.0 * FLUX;
         }
+        moving.narrow.add_changed(charges, rates, &mut out);
+        out
     }
 
     /// Charges of these twists that answer further potentials with their own.

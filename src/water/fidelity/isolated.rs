@@ -4,6 +4,7 @@ use super::kind::{FidelityKind, Knob};
 use crate::Result;
 use crate::adjoint::lie::Mat6;
 use crate::coupling;
+use crate::coupling::film::Films;
 use crate::geometry::Gap;
 use crate::water::device::Device;
 use crate::water::method::kind::{Problem, far};
@@ -116,7 +117,7 @@ impl FidelityKind for Isolated {
         Ok(Made {
             own_rates: Vec::new(),
             carried: None,
-            films: Vec::new(),
+            films: Films::default(),
             own: vec![None; made.len()],
             bodies: problem.named(made.iter().map(|m| m.as_made.clone())),
             coupling: Box::new(coupling),

@@ -4,8 +4,9 @@ use super::isolated::alone_slopes;
 use super::kind::{FidelityKind, Knob};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::boundary::Response;
+use crate::coupling::film::Films;
 use crate::coupling::reduced::{self, ReducedBody, Region, ShapeSlope, cache, compress};
-use crate::geometry::{Gap, TriMesh};
+use crate::geometry::{Gap, Solid, TriMesh};
 use crate::water::device::Device;
 use crate::water::gap_error::Carried;
 use crate::water::method::kind::{BodyMethod, Problem};
@@ -46,7 +47,7 @@ impl FidelityKind for Reduced {
             .collect();
         let coupling = coupling.with_shapes(slopes)?;
         let made = coupling.reduced_bodies();
-        let films = coupling.film_extents(problem.walls)?;
+        let films = coupling.films().clone();
         device.films = !films.is_empty();
         Ok(Made {
             own: problem.own(|b| Ok(made[b].parts().added_mass))?,
@@ -98,14 +99,22 @@ fn as_made(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<Discretis
 /// All bodies coupled by products.
 fn many(problem: &Problem, device: &mut Device) -> Result<Made> {
     let (made, unkept) = compressed_bodies(problem)?;
+    let films = match film_surfaces(problem)? {
+        None => Films::default(),
+        Some((surfaces, tolerances)) => {
+            let mut films = reduced::films(&made, &surfaces, &tolerances, problem.walls)?;
+            films.exclude(&problem.excluded);
+            films
+        }
+    };
     Ok(Made {
         own: problem.own(|b| Ok(made[b].parts().added_mass))?,
         own_rates: Vec::new(),
         carried: Some(Carried::Sources),
-        films: Vec::new(),
         warnings: [warnings(problem, &made), unkept].concat(),
         bodies: problem.named(as_made(problem, &made)?),
-        coupling: Box::new(products::scattering(problem, made, device)?),
+        coupling: Box::new(products::scattering(problem, made, films.clone(), device)?),
+        films,
     })
 }
 
@@ -153,18 +162,29 @@ fn compressed(problem: &Problem) -> Result<(reduced::Reduced, Vec<String>)> {
     };
     let names = bodies.iter().map(|b| b.name.to_string());
     let mut coupling = reduced::Reduced::new(made, problem.walls, cutoff)?.named(names);
-    if problem.numerics.films {
-        let mut surfaces = Vec::with_capacity(bodies.len());
-        for body in bodies {
-            // Finer faces in regions are for the sources; the film's potential is smooth.
-            let mesh = body.surface("the fidelity reduced")?;
-            let coarse = body.coarse.filter(|_| !body.regions.is_empty());
-            surfaces.push((coarse.map_or(mesh, |c| &c.mesh), body.solid));
-        }
-        let tolerances: Vec<f64> = (0..bodies.len()).map(|b| problem.tolerance(b)).collect();
+    if let Some((surfaces, tolerances)) = film_surfaces(problem)? {
         coupling = coupling.with_films(&surfaces, &tolerances, problem.walls)?;
     }
     Ok((coupling.excluding(&problem.excluded)?, unkept))
+}
+
+/// Surfaces and tolerances.
+type FilmSurfaces<'p> = (Vec<(&'p TriMesh, Option<&'p Solid>)>, Vec<f64>);
+
+/// What films are made of, one a body, where there may be any.
+fn film_surfaces<'p>(problem: &Problem<'p>) -> Result<Option<FilmSurfaces<'p>>> {
+    if !problem.numerics.films {
+        return Ok(None);
+    }
+    let mut surfaces = Vec::with_capacity(problem.bodies.len());
+    for body in problem.bodies {
+        // Finer faces in regions are for the sources; the film's potential is smooth.
+        let mesh = body.surface("the fidelity reduced")?;
+        let coarse = body.coarse.filter(|_| !body.regions.is_empty());
+        surfaces.push((coarse.map_or(mesh, |c| &c.mesh), body.solid));
+    }
+    let tolerances = (0..surfaces.len()).map(|b| problem.tolerance(b));
+    Ok(Some((surfaces, tolerances.collect())))
 }
 
 /// What each body answers by its own method; bodies that are equal share one. Sources as near as

@@ -4,6 +4,7 @@ use super::kind::{BodyMethod, Problem, Solved};
 use crate::Result;
 use crate::adjoint::lie::{Mat6, Pose};
 use crate::boundary::{self, BodyBoundary};
+use crate::coupling::film::Films;
 use crate::coupling::full::{FullSolver, Model};
 use crate::coupling::{Coupling, Exclusions};
 use crate::water::device::Device;
@@ -80,7 +81,7 @@ impl BodyMethod for Mfs {
             own_rates: Vec::new(),
             own,
             carried: None,
-            films: Vec::new(),
+            films: Films::default(),
             warnings: once(&made, |m| &m.warnings),
             bodies: problem.named(made.iter().map(|m| Discretisation {
                 method: self.label(),

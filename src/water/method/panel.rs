@@ -5,6 +5,7 @@ use crate::Result;
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::{Extrapolated, MassSlopes, Richardson, RichardsonSlopes};
+use crate::coupling::film::Films;
 use crate::coupling::full::SolveSettings;
 use crate::coupling::{Coupling, ExtrapolatedPanels, FilmedPanels, PanelCoupled, ShapeDirection};
 use crate::water::device::Device;
@@ -256,10 +257,10 @@ impl BodyMethod for Panel {
             Panels::Alone(fine.with_shapes(shapes.fine)?)
         };
         let (coupling, films): (Box<dyn Coupling>, _) = match problem.numerics.films {
-            false => (panels.boxed(), Vec::new()),
+            false => (panels.boxed(), Films::default()),
             true => {
                 let filmed = panels.filmed(problem)?;
-                let films = filmed.film_extents(problem.walls)?;
+                let films = filmed.films().clone();
                 device.films = !films.is_empty();
                 (Box::new(filmed), films)
             }

@@ -1,0 +1,341 @@
+//! Gaps that the points don't resolve: what their films add to the exchange, and what it changes that they hold bodies apart.
+//!
+//! Ĝ sees each pair of bodies as it is. Of those that a film holds apart it is corrected by what they see of each other at the greater distance less what they do as they are, point by point, so that
+//! the energy is that of the factor's ([`Reduced`](crate::coupling::reduced)); and the film's own is one matrix of both bodies' twists.
+
+use super::Scattering;
+use super::elsewhere::Changed;
+use crate::Result;
+use crate::adjoint::lie::{Pose, Vec6};
+use crate::coupling::film::{MovingFilms, PlacedFilms, Side};
+use crate::coupling::reduced::{Charge, FLUX, Link, Moved, PlacedSkeletons, ReducedBody};
+use crate::geometry::Image;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// All narrow gaps at some poses.
+pub(super) struct Narrow {
+    poses: Vec<Pose>,
+    bodies: Vec<Arc<ReducedBody>>,
+    points: Vec<Range<usize>>,
+    modes: Vec<Range<usize>>,
+    films: PlacedFilms,
+    /// Films hold nobody apart here.
+    none: PlacedFilms,
+    gaps: Vec<Gap>,
+}
+
+/// A narrow gap: between bodies, or a body and its own image.
+struct Gap {
+    link: Link,
+    /// What modes and twists see of each other beyond what Ĝ says: (modes + 6) × (modes + 6).
+    seen: DMatrix<f64>,
+    /// Impulses of the film to the twists of both bodies, or of the one, body frames.
+    film: DMatrix<f64>,
+}
+
+/// The same as bodies are displaced.
+pub(super) struct MovingNarrow<'n> {
+    narrow: &'n Narrow,
+    z: Vec<Vec6>,
+    films: MovingFilms<'n>,
+    still: MovingFilms<'n>,
+}
+
+impl Scattering {
+    /// The gaps at these poses that have films.
+    ///
+    /// # Errors
+    /// Bodies that touch.
+    pub(super) fn narrow(&self, poses: &[Pose]) -> Result<Narrow> {
+        let basis = DMatrix::zeros(6 * self.bodies.len(), 0);
+        let films = self.films.place(poses, &basis, &self.names)?;
+        let mut out = Narrow {
+            poses: Vec::new(),
+            bodies: Vec::new(),
+            points: Vec::new(),
+            modes: Vec::new(),
+            none: PlacedFilms::default(),
+            gaps: Vec::new(),
+            films,
+        };
+        if !out.films.any() {
+            return Ok(out);
+        }
+        out.poses = poses.to_vec();
+        out.bodies = self.bodies.clone();
+        out.points = self.points[..self.bodies.len()].to_vec();
+        out.modes = self.modes.clone();
+        let films: Vec<_> = out.films.iter().collect();
+        let gaps = films.par_iter().map(|film| {
+            let (own, other) = film.sides();
+            let link = match other {
+                Side::Body(b) => Link {
+                    target: own.min(b),
+                    source: own.max(b),
+                    image: Image::identity(),
+                    cutoff: None,
+                    factor: 1.0,
+                },
+                // Its own image, of which half counts.
+                Side::Wall(image) => Link {
+                    target: own,
+                    source: own,
+                    image,
+                    cutoff: None,
+                    factor: 0.5 * image.sign,
+                },
+            };
+            let block = |films| {
+                let placed = link.place(&self.bodies, poses, films);
+                placed.map(|placed| placed.block(&self.bodies))
+            };
+            let seen = match (block(&out.films), block(&out.none)) {
+                (Some(apart), Some(near)) => {
+                    let (rows, columns) = (apart.nrows(), apart.ncols());
+                    DMatrix::from_fn(rows, columns, |i, j| {
+                        link.factor * (apart[(i, j)] - near[(i, j)])
+                    })
+                }
+                // Without a cutoff no link fades.
+                _ => DMatrix::zeros(0, 0),
+            };
+            let film = film.impulses_of_each(&[link.target, link.source]);
+            Gap { link, seen, film }
+        });
+        out.gaps = gaps.collect();
+        Ok(out)
+    }
+}
+
+impl Gap {
+    /// The bodies, one or two.
+    fn bodies(&self) -> impl Iterator<Item = usize> + use<> {
+        let both = [self.link.target, self.link.source];
+        both.into_iter().take(self.film.ncols() / 6)
+    }
+}
+
+impl Narrow {
+    /// Whether there is any.
+    pub fn any(&self) -> bool {
+        !self.gaps.is_empty()
+    }
+
+    /// Adds to what modes and twists see of each other's charges and films, of the twists as impulses.
+    pub fn add_exchanged(
+        &self,
+        twists: &DVector<f64>,
+        modes: &[f64],
+        (seen, impulses): (&mut [f64], &mut DVector<f64>),
+    ) {
+        let numbers = |b: usize| {
+            let own = modes[self.modes[b].clone()].iter();
+            let twist = twists.rows(6 * b, 6);
+            DVector::from_iterator(
+                self.modes[b].len() + 6,
+                own.copied().chain(twist.iter().copied()),
+            )
+        };
+        for gap in &self.gaps {
+            let (t, s) = (gap.link.target, gap.link.source);
+            let mut add = |b: usize, x: DVector<f64>| {
+                let own = self.modes[b].clone();
+                let (of_modes, of_twists) = x.as_slice().split_at(own.len());
+                seen[own]
+                    .iter_mut()
+                    .zip(of_modes)
+                    .for_each(|(o, x)| *o += x);
+                let rows = impulses.as_mut_slice()[6 * b..6 * b + 6].iter_mut();
+                rows.zip(of_twists).for_each(|(o, x)| *o += FLUX * x);
+            };
+            add(t, &gap.seen * numbers(s));
+            add(s, gap.seen.tr_mul(&numbers(t)));
+            self.add_film_of(gap, twists, impulses);
+        }
+    }
+
+    /// Adds the impulses of twists that films have themselves.
+    pub fn add_impulses(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
+        for gap in &self.gaps {
+            self.add_film_of(gap, twists, out);
+        }
+    }
+
+    fn add_film_of(&self, gap: &Gap, twists: &DVector<f64>, out: &mut DVector<f64>) {
+        let mut own = DVector::zeros(gap.film.ncols());
+        for (k, b) in gap.bodies().enumerate() {
+            own.rows_mut(6 * k, 6).copy_from(&twists.rows(6 * b, 6));
+        }
+        let found = &gap.film * own;
+        for (k, b) in gap.bodies().enumerate() {
+            let mut rows = out.rows_mut(6 * b, 6);
+            rows += found.rows(6 * k, 6);
+        }
+    }
+
+    /// Both forms of each gap: as films hold it apart, and, to be taken off, as it is.
+    fn both(&self) -> Vec<[(PlacedSkeletons<'_>, f64); 2]> {
+        let of = |gap| {
+            let place = |films| Link::place(gap, &self.bodies, &self.poses, films);
+            Some([(place(&self.films)?, 1.0), (place(&self.none)?, -1.0)])
+        };
+        self.gaps.iter().filter_map(|gap| of(&gap.link)).collect()
+    }
+
+    /// Adds 4π αᵀ δĜ α of charges with themselves as spatial wrenches.
+    pub fn add_gradient(&self, charges: &[f64], out: &mut [Vec6]) {
+        let of = |[apart, near]: &[(PlacedSkeletons, f64); 2]| {
+            [apart, near].map(|(placed, _)| {
+                let [t, s] = self.ends(placed, charges);
+                placed.pull_back(&self.bodies, [t, t], [s, s])
+            })
+        };
+        let both = self.both();
+        let found: Vec<_> = both.par_iter().map(of).collect();
+        for (gap, found) in both.iter().zip(&found) {
+            for ((placed, sign), (wrench, force)) in gap.iter().zip(found) {
+                let told = (&(*sign * wrench), &(*sign * force));
+                placed.apply(&self.poses, self.holding(*sign), told, out);
+            }
+        }
+    }
+
+    /// Adds ∇E of what films have themselves, of body-frame twists.
+    pub fn add_wrenches(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
+        self.films.add_wrenches(x, y, out);
+    }
+
+    /// As the bodies are displaced by spatial twists.
+    pub fn along(&self, z: &[Vec6]) -> MovingNarrow<'_> {
+        MovingNarrow {
+            narrow: self,
+            films: self.films.along(z),
+            still: self.none.along(z),
+            z: match self.any() {
+                true => z.to_vec(),
+                false => Vec::new(),
+            },
+        }
+    }
+
+    /// What holds a form of a gap apart.
+    fn holding(&self, sign: f64) -> &PlacedFilms {
+        if sign > 0.0 { &self.films } else { &self.none }
+    }
+
+    /// Of charges those at the target and at the source.
+    fn ends<'c>(&self, placed: &PlacedSkeletons, charges: &'c [f64]) -> [&'c [f64]; 2] {
+        [placed.link.target, placed.link.source].map(|b| &charges[self.points[b].clone()])
+    }
+}
+
+impl MovingNarrow<'_> {
+    fn holding(&self, sign: f64) -> &MovingFilms<'_> {
+        if sign > 0.0 { &self.films } else { &self.still }
+    }
+
+    /// Adds `DĜ[Z] α`.
+    pub fn add_tangent_potentials(&self, charges: &[f64], out: &mut [f64]) {
+        let narrow = self.narrow;
+        let of = |(placed, sign): &(PlacedSkeletons, f64)| {
+            let moved = placed.moved(&narrow.poses, &self.z, self.holding(*sign));
+            let [t, s] = narrow.ends(placed, charges);
+            placed.tangent_potentials(&narrow.bodies, &moved, &[t], &[s])
+        };
+        let both = narrow.both();
+        let found: Vec<_> = both
+            .par_iter()
+            .map(|both| both.each_ref().map(of))
+            .collect();
+        for (gap, found) in both.iter().zip(&found) {
+            for ((placed, sign), found) in gap.iter().zip(found) {
+                self.add_at_ends(placed, *sign, [&found.on_target, &found.on_source], out);
+            }
+        }
+    }
+
+    /// Adds how what charges see changes, 4π αᵀ δĜ α, and how that changes, as the charges do at these rates.
+    pub fn add_changed(&self, charges: &[f64], rates: &[f64], out: &mut Changed) {
+        let narrow = self.narrow;
+        let bodies = &narrow.bodies;
+        let of = |(placed, sign): &(PlacedSkeletons, f64)| {
+            let moved: Moved = placed.moved(&narrow.poses, &self.z, self.holding(*sign));
+            let ([t, s], [dt, ds]) = (narrow.ends(placed, charges), narrow.ends(placed, rates));
+            let seen = placed.tangent_potentials(bodies, &moved, &[t], &[s]);
+            let [at_target, at_source] =
+                [(t, dt), (s, ds)].map(|(value, rate)| [Charge { value, rate }]);
+            let told = placed.tangent(bodies, (&moved, &seen.field), &at_target, &at_source);
+            let mut on_source = placed.sums(bodies, dt, 1);
+            let mut on_target = placed.potentials(bodies);
+            on_target = on_target
+                .chunks_exact(s.len())
+                .map(|row| row.iter().zip(ds).map(|(p, x)| p * x).sum())
+                .collect();
+            let factor = placed.link.factor;
+            let add = |out: &mut Vec<f64>, x: &[f64]| {
+                out.iter_mut()
+                    .zip(x)
+                    .for_each(|(o, x)| *o = factor * *o + x);
+            };
+            add(&mut on_target, &seen.on_target);
+            add(&mut on_source, &seen.on_source);
+            (told, [on_target, on_source])
+        };
+        let both = narrow.both();
+        let found: Vec<_> = both
+            .par_iter()
+            .map(|both| both.each_ref().map(of))
+            .collect();
+        for (gap, found) in both.iter().zip(&found) {
+            for ((placed, sign), (([w, dw], [f, df]), [t, s])) in gap.iter().zip(found) {
+                let [w, dw] = [w, dw].map(|w| *sign * w);
+                let [f, df] = [f, df].map(|f| *sign * f);
+                placed.apply(
+                    &narrow.poses,
+                    narrow.holding(*sign),
+                    (&w, &f),
+                    &mut out.gradient,
+                );
+                let told = ([&w, &dw], [&f, &df]);
+                placed.apply_jvp(
+                    &narrow.poses,
+                    self.holding(*sign),
+                    told,
+                    &self.z,
+                    &mut out.rate,
+                );
+                self.add_at_ends(placed, *sign, [t, s], &mut out.potentials);
+            }
+        }
+    }
+
+    fn add_at_ends(&self, placed: &PlacedSkeletons, sign: f64, seen: [&[f64]; 2], out: &mut [f64]) {
+        for (b, seen) in [placed.link.target, placed.link.source]
+            .into_iter()
+            .zip(seen)
+        {
+            let own = out[self.narrow.points[b].clone()].iter_mut();
+            own.zip(seen).for_each(|(o, x)| *o += sign * x);
+        }
+    }
+
+    /// Adds the rate of the impulses that films have themselves, of body-frame twists that stay as they are.
+    pub fn add_impulse_rate(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
+        self.films.add_impulse_rate(twists, out);
+    }
+
+    /// Adds ∇E of what films have themselves, of the first of one or two twists with the last, its rate, and the rates of the impulses of each.
+    pub fn add_tangent(
+        &self,
+        twists: &[&DVector<f64>],
+        wrenches: (&mut [Vec6], &mut [Vec6]),
+        impulses: &mut [DVector<f64>],
+    ) {
+        if self.narrow.any() {
+            self.films.add_tangent(twists, &self.z, wrenches, impulses);
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Bodies that settle in water into a heap: what a step costs, whether any is lost, and how the cost grows with the bodies.
 //!
-//! `cargo bench --bench heap [-- --bodies N] [--seconds T] [--step DT] [--fidelity NAME] [--accuracy A] [--exchange auto|factor|products] [--integrator NAME] [--growth]`: 200 bodies
+//! `cargo bench --bench heap [-- --bodies N] [--seconds T] [--step DT] [--fidelity NAME] [--accuracy A] [--exchange auto|factor|products] [--integrator NAME] [--no-films] [--growth]`: 200 bodies
 //! over 5 s in steps of 0.005 s, `isolated`, by momentum Euler; `--growth` instead 25 to 400 bodies over a shorter time.
 
 #[allow(dead_code)]
@@ -26,6 +26,7 @@ struct Case {
     accuracy: Option<f64>,
     exchange: Exchange,
     integrator: Integrator,
+    films: bool,
 }
 
 impl Case {
@@ -34,7 +35,8 @@ impl Case {
         let settings = Settings::default()
             .fidelity(self.fidelity)
             .exchange(self.exchange)
-            .integrator(self.integrator);
+            .integrator(self.integrator)
+            .films(self.films);
         let settings = match self.accuracy {
             Some(accuracy) => settings.accuracy(accuracy),
             None => settings,
@@ -112,6 +114,7 @@ fn main() -> hydrograd::Result<()> {
             Some(name) => name.parse().expect("the name of an integrator"),
             None => Integrator::MomentumEuler,
         },
+        films: !arguments.iter().any(|a| a == "--no-films"),
     };
     if !arguments.iter().any(|a| a == "--growth") {
         return case.tell().map(drop);

@@ -22,11 +22,12 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Arc<Film> {
     );
     let shares = Shares {
         floor: 0.25,
+        floor_at_edges: 0.25,
         rim: 0.43,
         rim_to_wall: 0.65,
         in_corners: true,
     };
-    Arc::new(Film::new(0, other, between, 4.0 * floor, &shares))
+    Arc::new(Film::new(0, other, between, 4.0 * floor, &shares, true))
 }
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.

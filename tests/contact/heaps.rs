@@ -120,13 +120,16 @@ fn sparse_gradients_hold() {
 /// Bodies that touch each other and the floor in water that couples them, by products: as by the factor within the accuracy, with gradients of their own.
 #[test]
 fn products_are_as_the_factor() {
-    for integrator in CONTACT_INTEGRATORS {
+    for (integrator, films) in CONTACT_INTEGRATORS
+        .into_iter()
+        .flat_map(|i| [(i, false), (i, true)])
+    {
         let scene = thrown(6);
         let make = |exchange| {
             let settings = Settings::default()
                 .fidelity(Fidelity::Reduced)
                 .exchange(exchange)
-                .films(false)
+                .films(films)
                 .accuracy(0.01)
                 .integrator(integrator);
             Simulator::new(&scene, settings).unwrap()
@@ -152,7 +155,9 @@ fn products_are_as_the_factor() {
         };
         let error = |h: f64| ((value(h) - value(-h)) / (2.0 * h) - told).abs() / told.abs();
         let best = error(1e-5);
-        println!("{integrator:?}: {pressed} pressed, {apart:.1e} apart, gradient {best:.1e}");
+        println!(
+            "{integrator:?}, films {films}: {pressed} pressed, {apart:.1e} apart, gradient {best:.1e}"
+        );
         assert!(apart < 0.01, "{integrator:?}: {apart}");
         assert!(best < 1e-6, "{integrator:?}: {best}");
     }

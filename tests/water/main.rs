@@ -27,6 +27,7 @@ mod scattering_films;
 mod sensors;
 mod several_pieces;
 mod shape_slopes;
+mod touching_edges;
 
 #[path = "../support/mod.rs"]
 mod support;

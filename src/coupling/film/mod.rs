@@ -54,8 +54,10 @@ pub(crate) struct Width {
 /// What a coupling's films are like.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shares {
-    /// How far bodies are held apart at contact, in the gap from which on they aren't.
+    /// How far round bodies are held apart at contact, in the gap from which on they aren't.
     pub floor: f64,
+    /// The same where one of them has edges.
+    pub floor_at_edges: f64,
     /// Where the flow in a film begins to go over into that around the bodies, in sizes of the first; it has at twice that. What holds bodies apart does so to all that
     /// isn't film as well, so this is where the rest of the added mass changes least with the gap: by spheres, capsules and an edge (docs/accuracy-coupled.md). Between flat
     /// faces it makes no difference.
@@ -67,6 +69,13 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
+    fn floor(&self, edged: bool) -> f64 {
+        match edged {
+            true => self.floor_at_edges,
+            false => self.floor,
+        }
+    }
+
     /// Distances between which the flow in a film goes over into that around the bodies, m, where the one on whose faces it is solved has this size, m.
     fn rims(&self, other: &Side, size: f64) -> [f64; 2] {
         let start = match other {
@@ -121,6 +130,7 @@ impl Film {
         (surface, opposite): (Arc<FilmSurface>, Arc<Opposite>),
         reach: f64,
         shares: &Shares,
+        edged: bool,
     ) -> Self {
         let rim = shares.rims(&other, surface.size);
         // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
@@ -131,7 +141,7 @@ impl Film {
             surface,
             opposite,
             width: Width {
-                floor: shares.floor * reach,
+                floor: shares.floor(edged) * reach,
                 reach,
             },
             rim,

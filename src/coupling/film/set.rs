@@ -187,7 +187,10 @@ impl Films {
                 (Side::Body(b), _) | (_, Place::Bodies(_, b)) => &self.bodies[b].opposite,
             };
             let between = (self.bodies[body].surface.clone(), opposite.clone());
-            Arc::new(Film::new(body, other, between, reach, &self.shares))
+            let edged =
+                self.bodies[body].flat || matches!(other, Side::Body(b) if self.bodies[b].flat);
+            let shares = &self.shares;
+            Arc::new(Film::new(body, other, between, reach, shares, edged))
         });
         film.clone()
     }

@@ -20,6 +20,7 @@ use std::sync::Arc;
 const REACH: f64 = 0.5;
 const SHARES: Shares = Shares {
     floor: 0.25,
+    floor_at_edges: 0.25,
     rim: 0.37,
     rim_to_wall: 0.55,
     // Panels are no worse there.

@@ -331,6 +331,11 @@ impl<'a> MovingFilms<'a> {
         self.0[apart.film].as_ref()
     }
 
+    fn each<T: Send>(&self, of: impl Fn(&MovingFilm<'a>) -> T + Sync) -> Vec<(&MovingFilm<'a>, T)> {
+        let films: Vec<_> = self.0.iter().flatten().collect();
+        films.into_par_iter().map(|film| (film, of(film))).collect()
+    }
+
     /// The water in all films, for body-frame twists (6·bodies), and as these gain `rates` where that is given.
     pub fn water(&self, twists: &DVector<f64>, rates: Option<&DVector<f64>>) -> Vec<Beside> {
         let films = self.0.iter().flatten();
@@ -339,8 +344,8 @@ impl<'a> MovingFilms<'a> {
 
     /// Adds the rate of the impulses of body-frame twists that stay as they are.
     pub fn add_impulse_rate(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
-        for film in self.0.iter().flatten() {
-            film.add_impulse_rate(&film.flow(twists), out);
+        for (film, flow) in self.each(|film| film.flow(twists)) {
+            film.add_impulse_rate(&flow, out);
         }
     }
 
@@ -352,9 +357,12 @@ impl<'a> MovingFilms<'a> {
         (gradient, rate): (&mut [Vec6], &mut [Vec6]),
         impulses: &mut [DVector<f64>],
     ) {
-        for film in self.0.iter().flatten() {
+        let of = |film: &MovingFilm| {
             let flows: Vec<_> = twists.iter().map(|x| film.flow(x)).collect();
-            let (w, dw) = film.wrench(&flows[0], &flows[flows.len() - 1]);
+            let told = film.wrench(&flows[0], &flows[flows.len() - 1]);
+            (flows, told)
+        };
+        for (film, (flows, (w, dw))) in self.each(of) {
             film.placed.apply(&w, gradient);
             film.apply_rate((&w, &dw), z, rate);
             for (impulse, flow) in impulses.iter_mut().zip(&flows) {

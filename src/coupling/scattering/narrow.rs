@@ -8,19 +8,15 @@ use super::elsewhere::Changed;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::film::{MovingFilms, PlacedFilms, Side};
-use crate::coupling::reduced::{Charge, FLUX, Link, Moved, PlacedSkeletons, ReducedBody};
+use crate::coupling::reduced::{Charge, FLUX, Link, Moved, PlacedSkeletons};
 use crate::geometry::Image;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::ops::Range;
-use std::sync::Arc;
 
 /// All narrow gaps at some poses.
-pub(super) struct Narrow {
+pub(super) struct Narrow<'a> {
+    model: &'a Scattering,
     poses: Vec<Pose>,
-    bodies: Vec<Arc<ReducedBody>>,
-    points: Vec<Range<usize>>,
-    modes: Vec<Range<usize>>,
     films: PlacedFilms,
     /// Films hold nobody apart here.
     none: PlacedFilms,
@@ -38,7 +34,7 @@ struct Gap {
 
 /// The same as bodies are displaced.
 pub(super) struct MovingNarrow<'n> {
-    narrow: &'n Narrow,
+    narrow: &'n Narrow<'n>,
     z: Vec<Vec6>,
     films: MovingFilms<'n>,
     still: MovingFilms<'n>,
@@ -49,25 +45,16 @@ impl Scattering {
     ///
     /// # Errors
     /// Bodies that touch.
-    pub(super) fn narrow(&self, poses: &[Pose]) -> Result<Narrow> {
+    pub(super) fn narrow(&self, poses: &[Pose]) -> Result<Narrow<'_>> {
         let basis = DMatrix::zeros(6 * self.bodies.len(), 0);
         let films = self.films.place(poses, &basis, &self.names)?;
         let mut out = Narrow {
-            poses: Vec::new(),
-            bodies: Vec::new(),
-            points: Vec::new(),
-            modes: Vec::new(),
+            model: self,
+            poses: poses.to_vec(),
             none: PlacedFilms::default(),
             gaps: Vec::new(),
             films,
         };
-        if !out.films.any() {
-            return Ok(out);
-        }
-        out.poses = poses.to_vec();
-        out.bodies = self.bodies.clone();
-        out.points = self.points[..self.bodies.len()].to_vec();
-        out.modes = self.modes.clone();
         let films: Vec<_> = out.films.iter().collect();
         let gaps = films.par_iter().map(|film| {
             let (own, other) = film.sides();
@@ -118,7 +105,7 @@ impl Gap {
     }
 }
 
-impl Narrow {
+impl<'a> Narrow<'a> {
     /// Whether there is any.
     pub fn any(&self) -> bool {
         !self.gaps.is_empty()
@@ -132,17 +119,17 @@ impl Narrow {
         (seen, impulses): (&mut [f64], &mut DVector<f64>),
     ) {
         let numbers = |b: usize| {
-            let own = modes[self.modes[b].clone()].iter();
+            let own = modes[self.model.modes[b].clone()].iter();
             let twist = twists.rows(6 * b, 6);
             DVector::from_iterator(
-                self.modes[b].len() + 6,
+                self.model.modes[b].len() + 6,
                 own.copied().chain(twist.iter().copied()),
             )
         };
         for gap in &self.gaps {
             let (t, s) = (gap.link.target, gap.link.source);
             let mut add = |b: usize, x: DVector<f64>| {
-                let own = self.modes[b].clone();
+                let own = self.model.modes[b].clone();
                 let (of_modes, of_twists) = x.as_slice().split_at(own.len());
                 seen[own]
                     .iter_mut()
@@ -179,7 +166,7 @@ impl Narrow {
     /// Both forms of each gap: as films hold it apart, and, to be taken off, as it is.
     fn both(&self) -> Vec<[(PlacedSkeletons<'_>, f64); 2]> {
         let of = |gap| {
-            let place = |films| Link::place(gap, &self.bodies, &self.poses, films);
+            let place = |films| Link::place(gap, &self.model.bodies, &self.poses, films);
             Some([(place(&self.films)?, 1.0), (place(&self.none)?, -1.0)])
         };
         self.gaps.iter().filter_map(|gap| of(&gap.link)).collect()
@@ -190,7 +177,7 @@ impl Narrow {
         let of = |[apart, near]: &[(PlacedSkeletons, f64); 2]| {
             [apart, near].map(|(placed, _)| {
                 let [t, s] = self.ends(placed, charges);
-                placed.pull_back(&self.bodies, [t, t], [s, s])
+                placed.pull_back(&self.model.bodies, [t, t], [s, s])
             })
         };
         let both = self.both();
@@ -214,10 +201,7 @@ impl Narrow {
             narrow: self,
             films: self.films.along(z),
             still: self.none.along(z),
-            z: match self.any() {
-                true => z.to_vec(),
-                false => Vec::new(),
-            },
+            z: z.to_vec(),
         }
     }
 
@@ -228,7 +212,7 @@ impl Narrow {
 
     /// Of charges those at the target and at the source.
     fn ends<'c>(&self, placed: &PlacedSkeletons, charges: &'c [f64]) -> [&'c [f64]; 2] {
-        [placed.link.target, placed.link.source].map(|b| &charges[self.points[b].clone()])
+        [placed.link.target, placed.link.source].map(|b| &charges[self.model.points[b].clone()])
     }
 }
 
@@ -243,7 +227,7 @@ impl MovingNarrow<'_> {
         let of = |(placed, sign): &(PlacedSkeletons, f64)| {
             let moved = placed.moved(&narrow.poses, &self.z, self.holding(*sign));
             let [t, s] = narrow.ends(placed, charges);
-            placed.tangent_potentials(&narrow.bodies, &moved, &[t], &[s])
+            placed.tangent_potentials(&narrow.model.bodies, &moved, &[t], &[s])
         };
         let both = narrow.both();
         let found: Vec<_> = both
@@ -260,7 +244,7 @@ impl MovingNarrow<'_> {
     /// Adds how what charges see changes, 4π αᵀ δĜ α, and how that changes, as the charges do at these rates.
     pub fn add_changed(&self, charges: &[f64], rates: &[f64], out: &mut Changed) {
         let narrow = self.narrow;
-        let bodies = &narrow.bodies;
+        let bodies = &narrow.model.bodies;
         let of = |(placed, sign): &(PlacedSkeletons, f64)| {
             let moved: Moved = placed.moved(&narrow.poses, &self.z, self.holding(*sign));
             let ([t, s], [dt, ds]) = (narrow.ends(placed, charges), narrow.ends(placed, rates));
@@ -317,7 +301,7 @@ impl MovingNarrow<'_> {
             .into_iter()
             .zip(seen)
         {
-            let own = out[self.narrow.points[b].clone()].iter_mut();
+            let own = out[self.narrow.model.points[b].clone()].iter_mut();
             own.zip(seen).for_each(|(o, x)| *o += sign * x);
         }
     }

@@ -62,7 +62,7 @@ pub struct Scattered<'a> {
     pub(super) pairs: Pairs,
     places: Places<f64>,
     making: Made,
-    pub(super) narrow: Narrow,
+    pub(super) narrow: Narrow<'a>,
     pub(super) motions: Box<dyn Motions + 'a>,
     pub(super) kept: Mutex<Kept>,
 }

@@ -2,6 +2,7 @@
 
 use super::{Carried, Change, GapReport, NearGap, Rollout};
 use crate::geometry::{Gap, Other};
+use std::collections::BTreeSet;
 
 /// Most changes that are kept with their times.
 const MOST: usize = 20;
@@ -48,14 +49,16 @@ impl Rollout {
         let widest = self.simulator.widest_film();
         let without = self.simulator.carried_without_films();
         let mut before = Vec::new();
+        let mut known = BTreeSet::new();
         for (sample, gap) in self.samples().iter().zip(self.gaps()) {
             let narrow = |gap: &Gap| gap.distance < widest;
             let now = match gap.as_ref().is_some_and(narrow) {
                 true => self.simulator.films(&sample.poses),
                 false => Vec::new(),
             };
-            let come = now.iter().filter(|p| !before.contains(*p));
-            let gone = before.iter().filter(|p| !now.contains(*p));
+            let there: BTreeSet<_> = now.iter().copied().collect();
+            let come = now.iter().filter(|p| !known.contains(*p));
+            let gone = before.iter().filter(|p| !there.contains(*p));
             let come = come.map(|pair| (pair, Carried::Film));
             for (pair, carried) in come.chain(gone.map(|pair| (pair, without))) {
                 out.changes += 1;
@@ -67,7 +70,7 @@ impl Rollout {
                     });
                 }
             }
-            before = now;
+            (before, known) = (now, there);
         }
     }
 

@@ -14,7 +14,7 @@ pub(super) fn faster(bodies: usize, walls: usize) -> bool {
 choices! {
     /// How compressed bodies are coupled.
     pub enum Exchange {
-        /// By products from 24 bodies on, twice as many with each wall, where the scene takes them. Films don't act then, and flow, pressure and sensors aren't told.
+        /// By products from 24 bodies on, twice as many with each wall, where the scene takes them. Flow, pressure and sensors aren't told then.
         #[default]
         Auto,
         /// By a factor of the whole exchange, cubic in the number of bodies.

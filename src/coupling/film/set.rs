@@ -14,6 +14,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// Films that were made stay up to so many times those that are near, and a few.
+const KEPT: usize = 4;
+const FEW: usize = 256;
+
 /// All films that there may be: those of gaps that were narrow once are kept, others made when their gaps are.
 #[derive(Clone, Default)]
 pub(crate) struct Films {
@@ -82,7 +86,7 @@ impl Films {
 
     /// Drops those between bodies that don't feel each other.
     pub fn exclude(&mut self, pairs: &Exclusions) {
-        self.excluded = pairs.clone();
+        self.excluded = Exclusions::new(self.excluded.iter().chain(pairs.iter()));
     }
 
     /// Whether there may be none.
@@ -175,24 +179,46 @@ impl Films {
         };
         let pairs = pairs.pairs().filter(narrow);
         let pairs = pairs.map(|(a, b)| Place::Bodies(a, b));
-        self.at_walls().chain(pairs).collect()
+        let at_wall = |place: &Place| match place {
+            Place::Wall(w, b) => {
+                let surface = &self.bodies[*b].surface;
+                let middle = self.walls[*w]
+                    .plane
+                    .field(&poses[*b].apply(&surface.center));
+                let reach = self.between(*place).2 + surface.radius;
+                // What isn't a number isn't far.
+                middle.distance <= reach || middle.distance.is_nan()
+            }
+            Place::Bodies(..) => false,
+        };
+        self.at_walls().filter(at_wall).chain(pairs).collect()
     }
 
-    fn film(&self, place: Place) -> Arc<Film> {
+    /// Films at places that ascend, kept for the next time.
+    fn films(&self, places: &[Place]) -> Vec<Arc<Film>> {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        let film = made.entry(place).or_insert_with(|| {
-            let (body, other, reach) = self.between(place);
-            let opposite = match (other, place) {
-                (Side::Wall(_), Place::Wall(w, _)) => &self.walls[w].plane,
-                (Side::Body(b), _) | (_, Place::Bodies(_, b)) => &self.bodies[b].opposite,
-            };
-            let between = (self.bodies[body].surface.clone(), opposite.clone());
-            let edged =
-                self.bodies[body].flat || matches!(other, Side::Body(b) if self.bodies[b].flat);
-            let shares = &self.shares;
-            Arc::new(Film::new(body, other, between, reach, shares, edged))
-        });
-        film.clone()
+        // Bodies that are stirred have met all others at last.
+        if made.len() > KEPT * places.len() + FEW {
+            made.retain(|place, _| places.binary_search(place).is_ok());
+        }
+        let film = |place: &Place| {
+            made.entry(*place)
+                .or_insert_with(|| self.made(*place))
+                .clone()
+        };
+        places.iter().map(film).collect()
+    }
+
+    fn made(&self, place: Place) -> Arc<Film> {
+        let (body, other, reach) = self.between(place);
+        let opposite = match (other, place) {
+            (Side::Wall(_), Place::Wall(w, _)) => &self.walls[w].plane,
+            (Side::Body(b), _) | (_, Place::Bodies(_, b)) => &self.bodies[b].opposite,
+        };
+        let between = (self.bodies[body].surface.clone(), opposite.clone());
+        let edged = self.bodies[body].flat || matches!(other, Side::Body(b) if self.bodies[b].flat);
+        let shares = &self.shares;
+        Arc::new(Film::new(body, other, between, reach, shares, edged))
     }
 
     /// The films at the poses, for a basis of body-frame twists; none of gaps that are wide. `names` are those of the bodies, for messages.
@@ -210,13 +236,13 @@ impl Films {
         if near.is_empty() {
             return Ok(PlacedFilms::default());
         }
-        let films: Vec<_> = near.into_iter().map(|place| self.film(place)).collect();
+        let films = self.films(&near);
         let place = |film| {
             let placed = PlacedFilm::new(film, poses, basis);
             placed.map_err(|distance| touching(film, distance, names))
         };
         let placed = in_order(films.par_iter().map(place))?;
-        Ok(PlacedFilms(placed.into_iter().flatten().collect()))
+        Ok(PlacedFilms::new(placed.into_iter().flatten().collect()))
     }
 
     /// What films add to the impulses of body-frame twists, 6·bodies × columns, at density 1.
@@ -252,39 +278,57 @@ fn touching(film: &Film, value: f64, names: &[String]) -> Error {
 
 /// The films at given poses, of all gaps that are narrow.
 #[derive(Default)]
-pub(crate) struct PlacedFilms(Vec<PlacedFilm>);
+pub(crate) struct PlacedFilms {
+    all: Vec<PlacedFilm>,
+    /// Numbers of those between two bodies, the lower one first, and of those of one body and walls.
+    of: BTreeMap<(usize, usize), Vec<usize>>,
+}
 
 impl PlacedFilms {
+    fn new(all: Vec<PlacedFilm>) -> Self {
+        let mut of = BTreeMap::<_, Vec<usize>>::new();
+        for (number, placed) in all.iter().enumerate() {
+            let (own, side) = placed.sides();
+            let other = match side {
+                Side::Body(b) => b,
+                Side::Wall(_) => own,
+            };
+            let both = (own.min(other), own.max(other));
+            of.entry(both).or_default().push(number);
+        }
+        Self { all, of }
+    }
+
     /// Whether there is one.
     pub fn any(&self) -> bool {
-        !self.0.is_empty()
+        !self.all.is_empty()
     }
 
     /// Each.
     pub fn iter(&self) -> impl Iterator<Item = &PlacedFilm> {
-        self.0.iter()
+        self.all.iter()
     }
 
     /// What holds the points of `source`, or of its image, off the body that sees them, if anything does.
     pub fn apart(&self, target: usize, source: usize, image: &Image) -> Option<Apart> {
-        let of = |(number, placed): (usize, &PlacedFilm)| {
-            Apart::of(number, &placed.film, (target, source), image)
-        };
-        self.0.iter().enumerate().find_map(of)
+        let numbers = self.of.get(&(target.min(source), target.max(source)))?;
+        let of =
+            |number: &usize| Apart::of(*number, &self.all[*number].film, (target, source), image);
+        numbers.iter().find_map(of)
     }
 
     /// The film that holds something apart.
     pub fn of(&self, apart: &Apart) -> Option<&PlacedFilm> {
-        self.0.get(apart.film)
+        self.all.get(apart.film)
     }
 
     fn each<T: Send>(&self, of: impl Fn(&PlacedFilm) -> T + Sync) -> Vec<(&PlacedFilm, T)> {
-        self.0.par_iter().map(|film| (film, of(film))).collect()
+        self.all.par_iter().map(|film| (film, of(film))).collect()
     }
 
     /// Adds the impulses of the twists in the columns, body frames.
     pub fn add_impulses(&self, twists: &DMatrix<f64>, out: &mut DMatrix<f64>) {
-        let films = self.0.iter();
+        let films = self.all.iter();
         films.for_each(|film| film.add_impulses(twists, out));
     }
 
@@ -318,7 +362,7 @@ impl PlacedFilms {
 
     /// The films along spatial displacements of the bodies.
     pub fn along(&self, z: &[Vec6]) -> MovingFilms<'_> {
-        MovingFilms(self.0.par_iter().map(|film| film.along(z)).collect())
+        MovingFilms(self.all.par_iter().map(|film| film.along(z)).collect())
     }
 }
 

@@ -23,7 +23,7 @@ pub struct Answer {
 pub struct Told {
     /// Body-frame twists, 6 a body.
     pub twists: DVector<f64>,
-    /// 4π Ūᵀ Ĝ α, body-frame impulses at unit density that the others add to each body's own.
+    /// 4π Ūᵀ Ĝ α and what films have, body-frame impulses at unit density that the others add to each body's own.
     pub exchanged: DVector<f64>,
     /// The twists that modes and charges were solved for: the same but for what a solve leaves open.
     pub(super) solved: DVector<f64>,

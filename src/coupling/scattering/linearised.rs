@@ -241,7 +241,8 @@ impl Linearised for ScatteredLinearised<'_> {
         let at = &self.at;
         let moving = at.moving(z);
         let (x, y) = (self.respond(&x), self.respond(&y));
-        let out = if x.charges == y.charges {
+        // A spin that makes no charges may move a film.
+        let out = if x.charges == y.charges && x.twists == y.twists {
             let mut bent = self.bent(&moving, &x.charges);
             bent.add_films(&moving, &x.twists);
             Tangent {

@@ -8,6 +8,8 @@
 //! M̄ x̄ = M̄₀ x̄ + 4π Ūᵀ Ĝ α
 //! ```
 //!
+//! In gaps that the points don't resolve films add impulses K x̄ of their own, and hold bodies apart: Ĝ has their distance as it is held there ([`narrow`]).
+//!
 //! Where momenta are given instead of twists, the twists are eliminated with them (recoil, [`Scattered::recoil`]): with what the bodies' own inertias answer to
 //! impulses, `x̄ = x̄₀ − T(4π Ūᵀ Ĝ α)`, it is still one system with one right-hand side,
 //!
@@ -200,7 +202,7 @@ impl Scattering {
         self
     }
 
-    /// From bodies that were coupled by a factor.
+    /// From bodies that were coupled by a factor, with its films.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for images and pairs that fade out or are left out; as [`Scattering::new`].
@@ -216,7 +218,8 @@ impl Scattering {
             });
         }
         let names = bodies.iter().map(|b| b.parts().name.clone()).collect();
-        Self::new(bodies.to_vec(), names, start, levels)
+        let made = Self::new(bodies.to_vec(), names, start, levels)?;
+        Ok(made.with_films(reduced.films().clone()))
     }
 
     /// The bodies.

@@ -5,6 +5,7 @@
 
 use super::Scattering;
 use super::elsewhere::Changed;
+use super::parts::of_each;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::film::{MovingFilms, PlacedFilms, Side};
@@ -118,28 +119,28 @@ impl<'a> Narrow<'a> {
         modes: &[f64],
         (seen, impulses): (&mut [f64], &mut DVector<f64>),
     ) {
+        let modes_of = |b: usize| self.model.modes[b].clone();
         let numbers = |b: usize| {
-            let own = modes[self.model.modes[b].clone()].iter();
-            let twist = twists.rows(6 * b, 6);
-            DVector::from_iterator(
-                self.model.modes[b].len() + 6,
-                own.copied().chain(twist.iter().copied()),
-            )
+            let (own, twist) = (&modes[modes_of(b)], twists.rows(6 * b, 6));
+            let all = own.iter().chain(twist.iter()).copied();
+            DVector::from_iterator(own.len() + 6, all)
         };
-        for gap in &self.gaps {
-            let (t, s) = (gap.link.target, gap.link.source);
-            let mut add = |b: usize, x: DVector<f64>| {
-                let own = self.model.modes[b].clone();
-                let (of_modes, of_twists) = x.as_slice().split_at(own.len());
-                seen[own]
-                    .iter_mut()
-                    .zip(of_modes)
-                    .for_each(|(o, x)| *o += x);
+        let of_gap = |k: usize| {
+            let Gap { link, seen, .. } = &self.gaps[k];
+            [
+                seen * numbers(link.source),
+                seen.tr_mul(&numbers(link.target)),
+            ]
+        };
+        let found = of_each(self.gaps.len(), of_gap);
+        for (gap, found) in self.gaps.iter().zip(&found) {
+            for (b, x) in [gap.link.target, gap.link.source].into_iter().zip(found) {
+                let (of_modes, of_twists) = x.as_slice().split_at(modes_of(b).len());
+                let own = seen[modes_of(b)].iter_mut();
+                own.zip(of_modes).for_each(|(o, x)| *o += x);
                 let rows = impulses.as_mut_slice()[6 * b..6 * b + 6].iter_mut();
                 rows.zip(of_twists).for_each(|(o, x)| *o += FLUX * x);
-            };
-            add(t, &gap.seen * numbers(s));
-            add(s, gap.seen.tr_mul(&numbers(t)));
+            }
             self.add_film_of(gap, twists, impulses);
         }
     }
@@ -169,7 +170,8 @@ impl<'a> Narrow<'a> {
             let place = |films| Link::place(gap, &self.model.bodies, &self.poses, films);
             Some([(place(&self.films)?, 1.0), (place(&self.none)?, -1.0)])
         };
-        self.gaps.iter().filter_map(|gap| of(&gap.link)).collect()
+        let gaps = self.gaps.par_iter();
+        gaps.filter_map(|gap| of(&gap.link)).collect()
     }
 
     /// Adds 4π αᵀ δĜ α of charges with themselves as spatial wrenches.

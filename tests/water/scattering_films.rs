@@ -1,7 +1,7 @@
 //! Films in gaps that many bodies' points don't resolve, by products: against the factor and differences, where faces, edges and rims lie close.
 
 use crate::support::says;
-use hydrograd::adjoint::lie::{Pose, Vec3, Vec6};
+use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::coupling::{Coupling, Direction, Linearised};
 use hydrograd::dynamics::Integrator;
@@ -29,11 +29,14 @@ fn pile(density: f64) -> (Scene, Vec<Pose>) {
         ),
         (Shape::sphere(0.03).faces(320), [-0.12, 0.1, 0.09]),
     ];
+    let mut random = Samples::new(5);
     let mut poses = Vec::new();
     for (k, (shape, at)) in parts.into_iter().enumerate() {
-        let body = Body::new(shape).density(density).at(at);
+        // Aligned to the last digit, distances have no slopes.
+        let turn = random.vector(0.005);
+        let body = Body::new(shape).density(density).at(at).rotated(turn);
         scene.add(body.named(format!("part {k}")));
-        poses.push(Pose::new(Pose::identity().rotation, Vec3::from(at)));
+        poses.push(Pose::new(exp_matrix(&Vec3::from(turn)), Vec3::from(at)));
     }
     scene.add_wall([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
     (scene, poses)
@@ -152,7 +155,7 @@ fn values_and_derivatives_are_those_of_the_factor() {
     for ((what, found), (_, right)) in found.iter().zip(&right) {
         let error = differ(found, right);
         println!("{what}: {error:.1e}");
-        assert!(error < 5e-3, "{what}: {error:e}");
+        assert!(error < 1e-4, "{what}: {error:e}");
     }
     // What the factor doesn't tell in one: by its parts.
     let factor = factor
@@ -168,7 +171,7 @@ fn values_and_derivatives_are_those_of_the_factor() {
         let told = found.iter().find(|(name, _)| *name == what).unwrap();
         let error = differ(&told.1, &right);
         println!("{what} by parts: {error:.1e}");
-        assert!(error < 5e-3, "{what}: {error:e}");
+        assert!(error < 1e-4, "{what}: {error:e}");
     }
 }
 
@@ -195,7 +198,7 @@ fn round(density: f64) -> (Scene, Vec<Pose>) {
 fn slopes_are_those_of_differences() {
     for (name, (scene, poses), most) in [
         ("round", round(2000.0), 1e-8),
-        ("edged", pile(2000.0), 1e-5),
+        ("edged", pile(2000.0), 2e-6),
     ] {
         let simulator = made(&scene, Exchange::Products, true);
         let products = coupling(&simulator).differentiable().unwrap();
@@ -240,7 +243,7 @@ fn closing_gaps_move_as_with_the_factor_and_have_gradients() {
     ];
     for (name, (mut scene, poses), most) in [
         ("round", round(1500.0), 1e-8),
-        ("edged", pile(1500.0), 1e-3),
+        ("edged", pile(1500.0), 3e-5),
     ] {
         let closing = |i: usize| match i % 6 {
             2 => -0.02 - 0.01 * (i / 6) as f64,
@@ -285,7 +288,7 @@ fn closing_gaps_move_as_with_the_factor_and_have_gradients() {
             println!(
                 "{name}, {integrator:?}: changes of velocity differ by {error:.1e}, gradients from the factor's by {from_factor:.1e}, from differences by {worst:.1e}"
             );
-            assert!(error < 0.01 && from_factor < 0.01, "{error}, {from_factor}");
+            assert!(error < 1e-3 && from_factor < 1e-4, "{error}, {from_factor}");
             assert!(worst < most, "{worst}");
         }
     }

@@ -75,12 +75,12 @@ fn moved(poses: &[Pose], z: &[Vec6], h: f64) -> Vec<Pose> {
 
 /// Twists, and displacements that open and close gaps and turn faces against each other, a hundredth of a gap at most.
 fn drawn(drawn: &mut Samples, bodies: usize, size: f64) -> Vec<Vec6> {
-    let mut one = |k: usize| {
+    let one = |k: usize| {
         Vec6::from_fn(|i, _| {
             size * if i < 3 { 1.0 } else { 5.0 } * drawn.number() / (1.0 + 0.1 * k as f64)
         })
     };
-    (0..bodies).map(|k| one(k)).collect()
+    (0..bodies).map(one).collect()
 }
 
 #[test]

@@ -202,7 +202,7 @@ pub(super) fn reduced_systems() -> Vec<Reduced> {
     ]
 }
 
-/// Two bodies that see each other by their points, by moments, and by both.
+/// Two bodies that see each other by their points, by moments, by both, and across films.
 pub(super) fn scattering_systems() -> Vec<Scattering> {
     let bodies = reduced_systems()[0].reduced_bodies().to_vec();
     let of = |sure: f64, most: f64| {
@@ -213,7 +213,14 @@ pub(super) fn scattering_systems() -> Vec<Scattering> {
         let names = vec!["a".to_string(), "b".to_string()];
         Scattering::new(bodies.clone(), names, &poses(), levels).unwrap()
     };
-    vec![of(0.01, 0.02), of(5.0, 6.0), of(0.3, 1.5)]
+    let mut out = vec![of(0.01, 0.02), of(5.0, 6.0), of(0.3, 1.5)];
+    // With a film between them; those with walls aren't made from a factor.
+    let levels = Levels::for_accuracy(1e-3).unwrap();
+    let filmed = film_systems();
+    let filmed = (filmed.iter()).filter_map(|s| Scattering::of(s, &poses(), levels.clone()).ok());
+    out.extend(filmed);
+    assert!(out.len() > 3, "no film");
+    out
 }
 
 /// Panels that come nearer than they resolve: to one another and to a wall, round ones and with edges, on one mesh and on two, by blocks and by the whole matrix.

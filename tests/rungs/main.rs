@@ -105,6 +105,10 @@ const THROUGH: &[(&str, &str)] = &[
         FULL_HVP,
     ),
     ("coupling::pair::Pair::apply_jvp", FULL_HVP),
+    (
+        "coupling::reduced::placed::PlacedSkeletons::apply_jvp",
+        "coupling::reduced::linearised::ReducedLinearised::hvp",
+    ),
     ("coupling::full::cpu::system::System::respond_jvp", FULL_HVP),
     ("coupling::full::cpu::CoupledSolution::gradient", FULL_VJP),
     ("coupling::panel::first::PlacedPanels::gradient", FULL_VJP),

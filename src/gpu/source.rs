@@ -69,7 +69,7 @@ shaders! {
     "cgls" => "solver/cgls.rs::cgls",
     "combine" => "solver/columns.rs::combine",
     "conjugate" => "coupling/reduced/linearised.rs::respond",
-    "coulomb" => "coupling/reduced/link.rs::potentials",
+    "coulomb" => "coupling/reduced/placed.rs::potentials",
     "coulomb_hvp" => "coupling/reduced/second.rs::link_tangent",
     "coulomb_jvp" => "coupling/reduced/second.rs::tangent_potentials",
     "coulomb_vjp" => "coupling/reduced/linearised.rs::pull_back",

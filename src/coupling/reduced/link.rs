@@ -1,10 +1,7 @@
 //! The blocks of G: a body and the image of another, or of itself.
 
 use super::ReducedBody;
-use super::placed::PlacedSkeletons;
 use crate::adjoint::lie::{Pose, Vec3};
-use crate::coupling::film::PlacedFilms;
-use crate::coupling::pair::Pair;
 use crate::geometry::Image;
 use std::sync::Arc;
 
@@ -108,25 +105,6 @@ impl Link {
         [(t, s), (s, t)]
             .into_iter()
             .take(if t == s { 1 } else { 2 })
-    }
-
-    /// The link at the poses, unless it has faded out.
-    pub(in crate::coupling) fn place(
-        &self,
-        bodies: &[Arc<ReducedBody>],
-        poses: &[Pose],
-        films: &PlacedFilms,
-    ) -> Option<PlacedSkeletons<'_>> {
-        let (t, s) = (self.target, self.source);
-        let (centre, between, weight) = self.reach(bodies, poses);
-        let points = &bodies[s].parts().points;
-        (weight[0] > 0.0).then(|| PlacedSkeletons {
-            link: self,
-            pair: Pair::new((t, &poses[t]), (s, &poses[s]), &self.image, points).held_off(films),
-            between,
-            centre,
-            weight,
-        })
     }
 }
 

@@ -23,7 +23,7 @@ pub mod cache;
 mod charges;
 mod check;
 pub mod compress;
-mod films;
+pub(crate) mod films;
 mod linearised;
 mod link;
 mod many;
@@ -37,7 +37,6 @@ mod surface;
 mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
-pub(crate) use films::films;
 pub use link::{Cutoff, Link};
 pub(in crate::coupling) use placed::{Charge, Moved, PlacedSkeletons};
 pub use region::Region;

@@ -65,6 +65,27 @@ pub(in crate::coupling) struct PointTangent {
     pub denergy: f64,
 }
 
+impl Link {
+    /// The link at the poses, unless it has faded out.
+    pub(in crate::coupling) fn place(
+        &self,
+        bodies: &[Arc<ReducedBody>],
+        poses: &[Pose],
+        films: &PlacedFilms,
+    ) -> Option<PlacedSkeletons<'_>> {
+        let (t, s) = (self.target, self.source);
+        let (centre, between, weight) = self.reach(bodies, poses);
+        let points = &bodies[s].parts().points;
+        (weight[0] > 0.0).then(|| PlacedSkeletons {
+            link: self,
+            pair: Pair::new((t, &poses[t]), (s, &poses[s]), &self.image, points).held_off(films),
+            between,
+            centre,
+            weight,
+        })
+    }
+}
+
 impl PlacedSkeletons<'_> {
     /// Whether the weight changes at this distance.
     pub fn fading(&self) -> bool {

@@ -102,7 +102,7 @@ fn many(problem: &Problem, device: &mut Device) -> Result<Made> {
     let films = match film_surfaces(problem)? {
         None => Films::default(),
         Some((surfaces, tolerances)) => {
-            let mut films = reduced::films(&made, &surfaces, &tolerances, problem.walls)?;
+            let mut films = reduced::films::films(&made, &surfaces, &tolerances, problem.walls)?;
             films.exclude(&problem.excluded);
             films
         }

@@ -217,7 +217,7 @@ pub(super) fn scattering_systems() -> Vec<Scattering> {
     // With a film between them; those with walls aren't made from a factor.
     let levels = Levels::for_accuracy(1e-3).unwrap();
     let filmed = film_systems();
-    let filmed = (filmed.iter()).filter_map(|s| Scattering::of(s, &poses(), levels.clone()).ok());
+    let filmed = (filmed.iter()).filter_map(|s| Scattering::of(s, &poses(), levels).ok());
     out.extend(filmed);
     assert!(out.len() > 3, "no film");
     out

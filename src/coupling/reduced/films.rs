@@ -24,11 +24,10 @@ const SHARES: Shares = Shares {
     in_corners: true,
 };
 
-/// The films in the gaps between compressed bodies, and to rigid walls, that their sources don't resolve: from the surface of each body in its own frame, and its shape by
-/// formula where it has one, and the tolerance to which it was compressed.
+/// The films of [`Reduced::with_films`], of any compressed bodies.
 ///
 /// # Errors
-/// [`Error::Input`] if there isn't one surface and tolerance for each body, or for a wall without normal.
+/// As there.
 pub(crate) fn films(
     bodies: &[Arc<ReducedBody>],
     surfaces: &[(&TriMesh, Option<&Solid>)],
@@ -65,10 +64,11 @@ pub(crate) fn films(
 }
 
 impl Reduced {
-    /// The same with [`films`].
+    /// The same with films in the gaps between bodies, and to rigid walls, that the sources don't resolve: from the surface of each body in its own frame, and its
+    /// shape by formula where it has one, and the tolerance to which it was compressed.
     ///
     /// # Errors
-    /// As there.
+    /// [`Error::Input`] if there isn't one surface and tolerance for each body, or for a wall without normal.
     pub fn with_films(
         mut self,
         surfaces: &[(&TriMesh, Option<&Solid>)],

@@ -8,7 +8,7 @@
 //! M̄ x̄ = M̄₀ x̄ + 4π Ūᵀ Ĝ α
 //! ```
 //!
-//! In gaps that the points don't resolve films add impulses K x̄ of their own, and hold bodies apart: Ĝ has their distance as it is held there ([`narrow`]).
+//! In gaps that the points don't resolve films add impulses K x̄ of their own, and hold bodies apart: Ĝ has their distance as it is held there (`narrow`).
 //!
 //! Where momenta are given instead of twists, the twists are eliminated with them (recoil, [`Scattered::recoil`]): with what the bodies' own inertias answer to
 //! impulses, `x̄ = x̄₀ − T(4π Ūᵀ Ĝ α)`, it is still one system with one right-hand side,

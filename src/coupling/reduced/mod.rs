@@ -38,7 +38,7 @@ mod views;
 
 pub use body::{CompressedParts, Fit, ReducedBody};
 pub use link::{Cutoff, Link};
-pub(in crate::coupling) use placed::{Charge, Moved, PlacedSkeletons};
+pub(in crate::coupling) use placed::{Charge, PlacedSkeletons};
 pub use region::Region;
 pub use slope::ShapeSlope;
 pub(super) use views::FLUX;

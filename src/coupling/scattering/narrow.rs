@@ -9,7 +9,7 @@ use super::parts::of_each;
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::film::{MovingFilms, PlacedFilms, Side};
-use crate::coupling::reduced::{Charge, FLUX, Link, Moved, PlacedSkeletons};
+use crate::coupling::reduced::{Charge, FLUX, Link, PlacedSkeletons};
 use crate::geometry::Image;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -164,31 +164,31 @@ impl<'a> Narrow<'a> {
         }
     }
 
-    /// Both forms of each gap: as films hold it apart, and, to be taken off, as it is.
-    fn both(&self) -> Vec<[(PlacedSkeletons<'_>, f64); 2]> {
-        let of = |gap| {
-            let place = |films| Link::place(gap, &self.model.bodies, &self.poses, films);
-            Some([(place(&self.films)?, 1.0), (place(&self.none)?, -1.0)])
-        };
-        let gaps = self.gaps.par_iter();
-        gaps.filter_map(|gap| of(&gap.link)).collect()
+    /// What both forms of each gap give: as films hold it apart, with the sign 1, and, to be taken off, as it is, with −1.
+    fn forms<T: Send>(
+        &self,
+        of: impl Fn(&PlacedSkeletons, f64) -> T + Sync,
+    ) -> Vec<(PlacedSkeletons<'_>, f64, T)> {
+        let both = |gap| [1.0, -1.0].map(|sign| (gap, sign));
+        let forms: Vec<(&Gap, f64)> = self.gaps.iter().flat_map(both).collect();
+        let forms = forms.into_par_iter().filter_map(|(gap, sign)| {
+            let films = self.holding(sign);
+            let placed = (gap.link).place(&self.model.bodies, &self.poses, films)?;
+            let found = of(&placed, sign);
+            Some((placed, sign, found))
+        });
+        forms.collect()
     }
 
     /// Adds 4π αᵀ δĜ α of charges with themselves as spatial wrenches.
     pub fn add_gradient(&self, charges: &[f64], out: &mut [Vec6]) {
-        let of = |[apart, near]: &[(PlacedSkeletons, f64); 2]| {
-            [apart, near].map(|(placed, _)| {
-                let [t, s] = self.ends(placed, charges);
-                placed.pull_back(&self.model.bodies, [t, t], [s, s])
-            })
+        let of = |placed: &PlacedSkeletons, _: f64| {
+            let [t, s] = self.ends(placed, charges);
+            placed.pull_back(&self.model.bodies, [t, t], [s, s])
         };
-        let both = self.both();
-        let found: Vec<_> = both.par_iter().map(of).collect();
-        for (gap, found) in both.iter().zip(&found) {
-            for ((placed, sign), (wrench, force)) in gap.iter().zip(found) {
-                let told = (&(*sign * wrench), &(*sign * force));
-                placed.apply(&self.poses, self.holding(*sign), told, out);
-            }
+        for (placed, sign, (wrench, force)) in self.forms(of) {
+            let told = (&(sign * wrench), &(sign * force));
+            placed.apply(&self.poses, self.holding(sign), told, out);
         }
     }
 
@@ -226,20 +226,13 @@ impl MovingNarrow<'_> {
     /// Adds `DĜ[Z] α`.
     pub fn add_tangent_potentials(&self, charges: &[f64], out: &mut [f64]) {
         let narrow = self.narrow;
-        let of = |(placed, sign): &(PlacedSkeletons, f64)| {
-            let moved = placed.moved(&narrow.poses, &self.z, self.holding(*sign));
+        let of = |placed: &PlacedSkeletons, sign: f64| {
+            let moved = placed.moved(&narrow.poses, &self.z, self.holding(sign));
             let [t, s] = narrow.ends(placed, charges);
             placed.tangent_potentials(&narrow.model.bodies, &moved, &[t], &[s])
         };
-        let both = narrow.both();
-        let found: Vec<_> = both
-            .par_iter()
-            .map(|both| both.each_ref().map(of))
-            .collect();
-        for (gap, found) in both.iter().zip(&found) {
-            for ((placed, sign), found) in gap.iter().zip(found) {
-                self.add_at_ends(placed, *sign, [&found.on_target, &found.on_source], out);
-            }
+        for (placed, sign, found) in narrow.forms(of) {
+            self.add_at_ends(&placed, sign, [&found.on_target, &found.on_source], out);
         }
     }
 
@@ -247,8 +240,8 @@ impl MovingNarrow<'_> {
     pub fn add_changed(&self, charges: &[f64], rates: &[f64], out: &mut Changed) {
         let narrow = self.narrow;
         let bodies = &narrow.model.bodies;
-        let of = |(placed, sign): &(PlacedSkeletons, f64)| {
-            let moved: Moved = placed.moved(&narrow.poses, &self.z, self.holding(*sign));
+        let of = |placed: &PlacedSkeletons, sign: f64| {
+            let moved = placed.moved(&narrow.poses, &self.z, self.holding(sign));
             let ([t, s], [dt, ds]) = (narrow.ends(placed, charges), narrow.ends(placed, rates));
             let seen = placed.tangent_potentials(bodies, &moved, &[t], &[s]);
             let [at_target, at_source] =
@@ -270,31 +263,13 @@ impl MovingNarrow<'_> {
             add(&mut on_source, &seen.on_source);
             (told, [on_target, on_source])
         };
-        let both = narrow.both();
-        let found: Vec<_> = both
-            .par_iter()
-            .map(|both| both.each_ref().map(of))
-            .collect();
-        for (gap, found) in both.iter().zip(&found) {
-            for ((placed, sign), (([w, dw], [f, df]), [t, s])) in gap.iter().zip(found) {
-                let [w, dw] = [w, dw].map(|w| *sign * w);
-                let [f, df] = [f, df].map(|f| *sign * f);
-                placed.apply(
-                    &narrow.poses,
-                    narrow.holding(*sign),
-                    (&w, &f),
-                    &mut out.gradient,
-                );
-                let told = ([&w, &dw], [&f, &df]);
-                placed.apply_jvp(
-                    &narrow.poses,
-                    self.holding(*sign),
-                    told,
-                    &self.z,
-                    &mut out.rate,
-                );
-                self.add_at_ends(placed, *sign, [t, s], &mut out.potentials);
-            }
+        for (placed, sign, (([w, dw], [f, df]), [t, s])) in narrow.forms(of) {
+            let ([w, dw], [f, df]) = ([w, dw].map(|w| sign * w), [f, df].map(|f| sign * f));
+            let held = narrow.holding(sign);
+            placed.apply(&narrow.poses, held, (&w, &f), &mut out.gradient);
+            let (moving, told) = (self.holding(sign), ([&w, &dw], [&f, &df]));
+            placed.apply_jvp(&narrow.poses, moving, told, &self.z, &mut out.rate);
+            self.add_at_ends(&placed, sign, [&t, &s], &mut out.potentials);
         }
     }
 

@@ -47,8 +47,9 @@ fn main(
         workgroupBarrier();
         for (var i = 0u; i < other.z; i++) {
             let panel = tile_face(i);
-            let k = row_gradient(panel, seen_by, s);
-            let p = charge_gradient(panel, seen_by, s);
+            let slopes = layers_gradient(panel, s);
+            let k = signed_vector(seen_by, slopes.double);
+            let p = signed_vector(seen_by, slopes.single);
             for (var x = 0u; x < LEFT; x++) {
                 let phi = densities[(i * 2u) * LEFT + x];
                 let q = densities[(i * 2u + 1u) * LEFT + x];

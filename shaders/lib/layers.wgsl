@@ -69,21 +69,23 @@ fn edge_sum(f: Face, w: V3) -> V3 {
     return v_fused(w.z, v_sub(f.a, f.c), v_fused(w.y, v_sub(f.c, f.b), first));
 }
 
-fn near_single(f: Face, s: V3) -> real {
+// Closed forms that share their terms: the single layer, its ∇, and the double layer.
+struct Closed { single: real, gradient: V3, double: real }
+
+fn near_both(f: Face, s: V3) -> Closed {
     let r0 = v_sub(f.a, s);
     let w = logarithms(f, length_of(r0), length_of(v_sub(f.b, s)), length_of(v_sub(f.c, s)));
+    let edges = edge_sum(f, w);
+    let angle = flux(f.a, f.b, f.c, f.m, s);
     // r_a × r_b is r_0 × e_ab, but for the edge that doesn't meet corner a, where e_0 × e_1 = m comes to it.
-    let along = v_fused(w.y, f.m, v_cross(r0, edge_sum(f, w)));
-    let plane = v_sub(along, v_scale(flux(f.a, f.b, f.c, f.m, s), r0));
-    return mul(mul(inverse_4pi(), f.inverse), v_dot(f.m, plane));
-}
-
-fn near_single_gradient(f: Face, s: V3) -> V3 {
-    let l0 = length_of(v_sub(f.a, s));
-    let l1 = length_of(v_sub(f.b, s));
-    let l2 = length_of(v_sub(f.c, s));
-    let turned = v_cross(f.m, edge_sum(f, logarithms(f, l0, l1, l2)));
-    return v_scale(mul(inverse_4pi(), f.inverse), v_fused(flux(f.a, f.b, f.c, f.m, s), f.m, turned));
+    let along = v_fused(w.y, f.m, v_cross(r0, edges));
+    let plane = v_sub(along, v_scale(angle, r0));
+    let scale = mul(inverse_4pi(), f.inverse);
+    return Closed(
+        mul(scale, v_dot(f.m, plane)),
+        v_scale(scale, v_fused(angle, f.m, v_cross(f.m, edges))),
+        mul(inverse_4pi(), angle),
+    );
 }
 
 // ∇λ_ab·d, from the slopes r·d/l of its ends.
@@ -232,30 +234,41 @@ fn within(f: Face, squared: real) -> bool {
     return !negative(sub(mul(num(25.0), f.reach), squared));
 }
 
+// Each closed form stands once in a function: compilers put it wherever it is called.
+
 fn single_layer(f: Face, s: V3) -> real {
     let r = v_sub(s, f.centre);
     let squared = v_dot(r, r);
-    if within(f, squared) {
-        return near_single(f, s);
+    var near = num(0.0);
+    if !beyond(f, squared) {
+        near = near_both(f, s).single;
+        if within(f, squared) {
+            return near;
+        }
     }
     let far = far_single(f, multipoles(f, r, squared));
     if beyond(f, squared) {
         return far;
     }
-    return add(far, mul(weight(f, squared).value, sub(near_single(f, s), far)));
+    return add(far, mul(weight(f, squared).value, sub(near, far)));
 }
 
-fn double_layer(f: Face, s: V3) -> real {
+// By the closed form at any distance where `closed` says so.
+fn double_layer(f: Face, s: V3, closed: bool) -> real {
     let r = v_sub(s, f.centre);
     let squared = v_dot(r, r);
-    if within(f, squared) {
-        return near_double(f, s);
+    var near = num(0.0);
+    if closed || !beyond(f, squared) {
+        near = near_double(f, s);
+        if closed || within(f, squared) {
+            return near;
+        }
     }
     let far = far_double(f, multipoles(f, r, squared));
     if beyond(f, squared) {
         return far;
     }
-    return add(far, mul(weight(f, squared).value, sub(near_double(f, s), far)));
+    return add(far, mul(weight(f, squared).value, sub(near, far)));
 }
 
 fn near_double(f: Face, s: V3) -> real {
@@ -271,31 +284,66 @@ fn blended(w: Weight, r: V3, difference: real, near: V3, far: V3) -> V3 {
 fn single_layer_gradient(f: Face, s: V3) -> V3 {
     let r = v_sub(s, f.centre);
     let squared = v_dot(r, r);
-    if within(f, squared) {
-        return near_single_gradient(f, s);
+    var near = Closed(num(0.0), v_zero(), num(0.0));
+    if !beyond(f, squared) {
+        near = near_both(f, s);
+        if within(f, squared) {
+            return near.gradient;
+        }
     }
     let x = multipoles(f, r, squared);
     let far = far_single_gradient(f, x);
     if beyond(f, squared) {
         return far;
     }
-    let difference = sub(near_single(f, s), far_single(f, x));
-    return blended(weight(f, squared), r, difference, near_single_gradient(f, s), far);
+    let difference = sub(near.single, far_single(f, x));
+    return blended(weight(f, squared), r, difference, near.gradient, far);
 }
 
 fn double_layer_gradient(f: Face, s: V3) -> V3 {
     let r = v_sub(s, f.centre);
     let squared = v_dot(r, r);
-    if within(f, squared) {
-        return v_scale(inverse_4pi(), flux_gradient(f.a, f.b, f.c, f.m, s));
+    var near = v_zero();
+    if !beyond(f, squared) {
+        near = v_scale(inverse_4pi(), flux_gradient(f.a, f.b, f.c, f.m, s));
+        if within(f, squared) {
+            return near;
+        }
     }
     let x = multipoles(f, r, squared);
     let far = far_double_gradient(f, x);
     if beyond(f, squared) {
         return far;
     }
-    let near = v_scale(inverse_4pi(), flux_gradient(f.a, f.b, f.c, f.m, s));
     return blended(weight(f, squared), r, sub(near_double(f, s), far_double(f, x)), near, far);
+}
+
+// ∇ of both layers.
+struct Slopes { single: V3, double: V3 }
+
+fn layers_gradient(f: Face, s: V3) -> Slopes {
+    let r = v_sub(s, f.centre);
+    let squared = v_dot(r, r);
+    var near = Closed(num(0.0), v_zero(), num(0.0));
+    var angle = v_zero();
+    if !beyond(f, squared) {
+        near = near_both(f, s);
+        angle = v_scale(inverse_4pi(), flux_gradient(f.a, f.b, f.c, f.m, s));
+        if within(f, squared) {
+            return Slopes(near.gradient, angle);
+        }
+    }
+    let x = multipoles(f, r, squared);
+    let single = far_single_gradient(f, x);
+    let double = far_double_gradient(f, x);
+    if beyond(f, squared) {
+        return Slopes(single, double);
+    }
+    let w = weight(f, squared);
+    return Slopes(
+        blended(w, r, sub(near.single, far_single(f, x)), near.gradient, single),
+        blended(w, r, sub(near.double, far_double(f, x)), angle, double),
+    );
 }
 
 // ∇K and ∇∇K d = ∇∇F d + w ∇∇D d + 2 w' {(r·d) ∇D + (∇D·d) r + D d} + 4 w'' (r·d) D r.
@@ -314,18 +362,27 @@ fn blended_bent(w: Weight, r: V3, d: V3, difference: real, near: Bent, far: Bent
 // ∇ and ∇∇ d of both layers.
 struct Layers { single: Bent, double: Bent }
 
-fn near_bent(f: Face, s: V3, d: V3) -> Layers {
+fn near_bent(f: Face, s: V3, d: V3, near: Closed) -> Layers {
     let angle = flux_hessian_product(f.a, f.b, f.c, f.m, s, d);
-    let single = Bent(near_single_gradient(f, s), near_single_product(f, s, d, angle.gradient));
     let w = inverse_4pi();
-    return Layers(single, Bent(v_scale(w, angle.gradient), v_scale(w, angle.product)));
+    return Layers(
+        Bent(near.gradient, near_single_product(f, s, d, angle.gradient)),
+        Bent(v_scale(w, angle.gradient), v_scale(w, angle.product)),
+    );
 }
 
 fn layers_hessian_product(f: Face, s: V3, d: V3) -> Layers {
     let r = v_sub(s, f.centre);
     let squared = v_dot(r, r);
-    if within(f, squared) {
-        return near_bent(f, s, d);
+    let none = Bent(v_zero(), v_zero());
+    var near = Closed(num(0.0), v_zero(), num(0.0));
+    var bent = Layers(none, none);
+    if !beyond(f, squared) {
+        near = near_both(f, s);
+        bent = near_bent(f, s, d, near);
+        if within(f, squared) {
+            return bent;
+        }
     }
     let x = multipoles(f, r, squared);
     let single = Bent(far_single_gradient(f, x), far_single_product(f, x, d));
@@ -333,10 +390,9 @@ fn layers_hessian_product(f: Face, s: V3, d: V3) -> Layers {
     if beyond(f, squared) {
         return Layers(single, double);
     }
-    let near = near_bent(f, s, d);
     let w = weight(f, squared);
     return Layers(
-        blended_bent(w, r, d, sub(near_single(f, s), far_single(f, x)), near.single, single),
-        blended_bent(w, r, d, sub(near_double(f, s), far_double(f, x)), near.double, double),
+        blended_bent(w, r, d, sub(near.single, far_single(f, x)), bent.single, single),
+        blended_bent(w, r, d, sub(near.double, far_double(f, x)), bent.double, double),
     );
 }

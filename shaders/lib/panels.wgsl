@@ -56,14 +56,14 @@ fn signed_vector(way: u32, v: V3) -> V3 {
 
 // A_ij: ½ of a panel itself, Ω/4π of others.
 fn row(f: Face, way: u32, s: V3) -> real {
-    if way == OWN {
+    let own = way == OWN;
+    if own {
         let r = v_sub(s, f.centre);
         if narrow(v_dot(r, r)) <= 1e-10 * narrow(f.reach) {
             return num(0.5);
         }
-        return near_double(f, s);
     }
-    return signed(way, double_layer(f, s));
+    return signed(way, double_layer(f, s, own));
 }
 
 fn row_gradient(f: Face, way: u32, s: V3) -> V3 {

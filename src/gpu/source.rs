@@ -2,8 +2,8 @@
 //!
 //! A shader says in a line `//! uses:` which files of `shaders/lib` it stands on, in order, and in a line
 //! `//! constants:` what is fixed when it is compiled (a number of columns, a variant, the surface). Loops over such a number are
-//! written out: what they index by then stays in registers, whatever the driver's compiler makes of loops. Nothing here
-//! needs a device.
+//! written out: what they index by then stays in registers, whatever the driver's compiler makes of loops. Of `if` and `else` over such a
+//! variant one stays: compilers first put in what both call, which takes them most of their time. Nothing here needs a device.
 
 /// Real numbers that a shader computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -224,7 +224,38 @@ fn counted<'a>(line: &'a str, constants: &[(&str, Constant)]) -> Option<(&'a str
     }
 }
 
-/// Lines with their loops over constants written out.
+/// What of an `if` over one of the constants is kept, from the lines behind it: their range, and where the text goes on.
+fn chosen(
+    lines: &[&str],
+    at: usize,
+    constants: &[(&str, Constant)],
+) -> Option<(std::ops::Range<usize>, usize)> {
+    let line = lines[at].trim_start();
+    let indent = &lines[at][..lines[at].len() - line.len()];
+    let asked = line.strip_prefix("if ")?.strip_suffix(" {")?;
+    let (name, wanted) = match asked.strip_prefix('!') {
+        Some(name) => (name, false),
+        None => (asked, true),
+    };
+    let known = constants.iter().find(|(n, _)| *n == name);
+    let Some((_, Constant::Flag(flag))) = known else {
+        return None;
+    };
+    let next = |from: usize, text: &str| {
+        let found = |i: &usize| lines[*i].strip_prefix(indent) == Some(text);
+        (from..lines.len()).find(found)
+    };
+    let end = next(at + 1, "}")?;
+    let other = next(at + 1, "} else {").filter(|i| *i < end);
+    let kept = match (*flag == wanted, other) {
+        (true, _) => at + 1..other.unwrap_or(end),
+        (false, Some(other)) => other + 1..end,
+        (false, None) => end..end,
+    };
+    Some((kept, end + 1))
+}
+
+/// Lines with their loops over constants written out, and what constants choose.
 fn write_out(lines: &[&str], constants: &[(&str, Constant)], out: &mut String) {
     let mut at = 0;
     while at < lines.len() {
@@ -240,6 +271,15 @@ fn write_out(lines: &[&str], constants: &[(&str, Constant)], out: &mut String) {
                 out.push_str(&format!("{indent}}}\n"));
             }
             at = end + 1;
+            continue;
+        }
+        if let Some((kept, next)) = chosen(lines, at, constants) {
+            if !kept.is_empty() {
+                out.push_str(&format!("{indent}{{\n"));
+                write_out(&lines[kept], constants, out);
+                out.push_str(&format!("{indent}}}\n"));
+            }
+            at = next;
             continue;
         }
         out.push_str(line);

@@ -241,18 +241,21 @@ fn chosen(
     let Some((_, Constant::Flag(flag))) = known else {
         return None;
     };
-    let next = |from: usize, text: &str| {
-        let found = |i: &usize| lines[*i].strip_prefix(indent) == Some(text);
-        (from..lines.len()).find(found)
+    let closing = |from: usize| {
+        let closes =
+            |i: &usize| (lines[*i].strip_prefix(indent)).is_some_and(|l| l.starts_with('}'));
+        let i = (from..lines.len()).find(closes)?;
+        Some((i, lines[i].trim_start()))
     };
-    let end = next(at + 1, "}")?;
-    let other = next(at + 1, "} else {").filter(|i| *i < end);
-    let kept = match (*flag == wanted, other) {
-        (true, _) => at + 1..other.unwrap_or(end),
-        (false, Some(other)) => other + 1..end,
-        (false, None) => end..end,
+    let (yes, no, end) = match closing(at + 1)? {
+        (end, "}") => (at + 1..end, end..end, end),
+        (other, "} else {") => match closing(other + 1)? {
+            (end, "}") => (at + 1..other, other + 1..end, end),
+            _ => return None,
+        },
+        _ => return None,
     };
-    Some((kept, end + 1))
+    Some((if *flag == wanted { yes } else { no }, end + 1))
 }
 
 /// Lines with their loops over constants written out, and what constants choose.

@@ -27,7 +27,8 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Arc<Film> {
         rim_to_wall: 0.65,
         in_corners: true,
     };
-    Arc::new(Film::new(0, other, between, 4.0 * floor, &shares, true))
+    let reach = shares.reach(&other, between.0.size, 4.0 * floor);
+    Arc::new(Film::new(0, other, between, reach, &shares, true))
 }
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.

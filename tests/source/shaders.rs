@@ -106,6 +106,45 @@ fn every_shader_is_valid_in_every_arithmetic() {
     }
 }
 
+#[test]
+fn constants_choose_and_count() {
+    let text = "\
+//! constants: WIDE FLAG
+fn f() {
+    if FLAG {
+        yes();
+    } else {
+        for (var k = 0u; k < WIDE; k++) {
+            no(k);
+        }
+    }
+    if !FLAG {
+        also();
+    }
+    if other {
+        kept();
+    }
+}
+";
+    let shader = Shader {
+        name: "choice",
+        text,
+        twin: "",
+    };
+    for (flag, counts) in [(true, [1, 0, 0, 1]), (false, [0, 2, 1, 1])] {
+        let constants = [
+            ("WIDE", Constant::Number(2)),
+            ("FLAG", Constant::Flag(flag)),
+        ];
+        let text = shader.assemble(Arithmetic::Single, &constants).unwrap();
+        let found =
+            ["yes();", "no(k);", "also();", "kept();"].map(|call| text.matches(call).count());
+        assert_eq!(found, counts, "{text}");
+        assert!(!text.contains("if FLAG") && !text.contains("if !FLAG"));
+        assert_eq!(text.matches('{').count(), text.matches('}').count());
+    }
+}
+
 /// Bytes of workgroup memory and storage buffers that src/gpu/context.rs asks an adapter for.
 fn asked_for(name: &str) -> u32 {
     let context = std::fs::read_to_string(root().join("src/gpu/context.rs")).unwrap();

@@ -85,6 +85,12 @@ impl Shares {
         };
         [start, 2.0 * start].map(|part| part * size)
     }
+
+    /// The gap from which on there is a film, m, of what the points resolve: where nothing of it is film bodies aren't held apart, or they would be by a jump as the
+    /// first of it is.
+    pub fn reach(&self, other: &Side, size: f64, resolved: f64) -> f64 {
+        self.rims(other, size)[1].min(resolved)
+    }
 }
 
 /// Where a film is.
@@ -125,6 +131,7 @@ pub(crate) struct Film {
 type LastPattern = (Vec<usize>, Arc<SparsePattern>);
 
 impl Film {
+    /// From the gap where it begins ([`Shares::reach`]), m.
     pub fn new(
         body: usize,
         other: Side,
@@ -134,8 +141,6 @@ impl Film {
         edged: bool,
     ) -> Self {
         let rim = shares.rims(&other, surface.size);
-        // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
-        let reach = rim[1].min(reach);
         Self {
             body,
             other,

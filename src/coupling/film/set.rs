@@ -128,9 +128,8 @@ impl Films {
                 (own, Side::Body(other), reach)
             }
         };
-        let [_, end] = self.shares.rims(&other, self.bodies[body].surface.size);
-        // Where nothing of it is film bodies aren't held apart, or they would be by a jump as the first of it is.
-        (body, other, end.min(reach))
+        let size = self.bodies[body].surface.size;
+        (body, other, self.shares.reach(&other, size, reach))
     }
 
     /// Where the film is between a body and another, or a wall by its number, if there may be one.

@@ -60,7 +60,7 @@ pub fn make(how: &How) -> Made {
         let (time, way) = (of(&|s| s.time), of(&|s| s.q[2] - samples[0].q[2]));
         let energy = of(&|s| s.kinetic_energy / samples[0].kinetic_energy);
         let end = &samples[steps];
-        let inertia = simulator.equations(&samples[0].q)?.mass_matrix()[(2, 2)];
+        let inertia = simulator.equations(&samples[0].q)?.mass_matrix()?[(2, 2)];
         let exact = exact(name, inertia, scene.fluid.density, end.time);
         numbers.insert(
             name.into(),

@@ -152,7 +152,7 @@ impl Equations {
     fn mass_matrix<'py>(&self, py: Python<'py>, part: &str) -> PyResult<Array<'py>> {
         let n = self.velocities();
         let of = match part {
-            "total" => |e: &simulate::Equations<'_>| Ok(e.mass_matrix().clone()),
+            "total" => |e: &simulate::Equations<'_>| e.mass_matrix().cloned(),
             "rigid" => |e: &simulate::Equations<'_>| e.rigid_mass_matrix(),
             "fluid" => |e: &simulate::Equations<'_>| e.added_mass_matrix(),
             _ => {

@@ -1,11 +1,15 @@
 //! What bodies of a scene start from, and their surfaces as forces see them.
 
+use crate::Result;
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Mat3, Vec3};
 use crate::adjoint::waterline::Hull;
 use crate::dynamics::BodyValues;
 use crate::geometry::{MassProperties, TriMesh};
-use crate::scene::{Body, Scene};
+use crate::scene::{Body, Scene, Shape};
+use crate::shape::build;
+use std::f64::consts::PI;
+use std::path::Path;
 
 /// What a body starts from, whose shape has these properties.
 pub(super) fn body_values(
@@ -81,6 +85,16 @@ pub(super) fn elements(mesh: &TriMesh) -> Vec<Element> {
             area: mesh.area(f),
         })
         .collect()
+}
+
+/// What is buoyant of a body without a shape, a ball of its volume: how it comes through the surface isn't known any better.
+pub(super) fn ball(values: &BodyValues) -> Result<Option<Hull>> {
+    let Some(volume) = values.volume.filter(|v| *v > 0.0) else {
+        return Ok(None);
+    };
+    let radius = (0.75 / PI * volume).cbrt();
+    let mesh = build(&Shape::sphere(radius), Path::new(""), None)?;
+    Ok(Some(hull(&mesh)))
 }
 
 pub(super) fn hull(mesh: &TriMesh) -> Hull {

@@ -23,7 +23,7 @@ use crate::policy::Policy;
 use crate::scene::{Body, Scene, Site};
 use crate::water::{self, Clearance, FlowSurface, Prepared, ShapeChange, Surface, pose};
 use crate::{Error, Result};
-use bodies::{body_values, elements, hull};
+use bodies::{ball, body_values, elements, hull};
 use nalgebra::DVector;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -162,9 +162,12 @@ pub(crate) fn assemble(
         .collect();
     let clearance = Clearance::new(scene, &surfaces, &tree)?;
     let hulls: Vec<Option<Hull>> = match scene.waterline {
-        Some(_) => (surfaces.iter())
-            .map(|s| Some(hull(&s.as_ref()?.mesh)))
-            .collect(),
+        Some(_) => (surfaces.iter().zip(&values))
+            .map(|(s, values)| match s {
+                Some(s) => Ok(Some(hull(&s.mesh))),
+                None => ball(values),
+            })
+            .collect::<Result<_>>()?,
         None => Vec::new(),
     };
     let mut declared = Declarations::new(scene.fluid.density, &values);

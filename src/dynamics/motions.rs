@@ -16,6 +16,13 @@ impl Motions {
         Self { velocities, each }
     }
 
+    /// Those that move none of the velocities in `held`.
+    pub(super) fn sparing(&self, held: &[bool]) -> Self {
+        let free = |motion: &&Vec<(usize, f64)>| motion.iter().all(|(i, x)| *x == 0.0 || !held[*i]);
+        let each = self.each.iter().filter(free);
+        Self::new(self.velocities, each.cloned().collect())
+    }
+
     /// Number of motions.
     pub fn len(&self) -> usize {
         self.each.len()

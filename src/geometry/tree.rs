@@ -75,8 +75,13 @@ impl MeshTree {
 
     /// Area of a face, m².
     pub fn area(&self, face: usize) -> f64 {
+        self.area_vector(face).norm()
+    }
+
+    /// That along its outward normal, m².
+    pub fn area_vector(&self, face: usize) -> Vec3 {
         let [a, b, c] = self.triangles[face].corners;
-        0.5 * (b - a).cross(&(c - a)).norm()
+        0.5 * (b - a).cross(&(c - a))
     }
 
     /// Mean edge length around the face closest to a point, m.

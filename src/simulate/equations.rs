@@ -99,8 +99,13 @@ pub(super) fn check_numbers(place: &str, x: &DVector<f64>, n: usize) -> Result<(
 
 impl Equations<'_> {
     /// M(q), rigid and fluid, generalised coordinates: kg, kg m, kg m².
-    pub fn mass_matrix(&self) -> &DMatrix<f64> {
-        self.at.mass_matrix()
+    ///
+    /// # Errors
+    /// A solve of the coupling that misses its tolerance.
+    pub fn mass_matrix(&self) -> Result<&DMatrix<f64>> {
+        let found = self.at.mass_matrix();
+        self.at.check()?;
+        Ok(found)
     }
 
     /// The bodies' own part of M(q).
@@ -117,9 +122,9 @@ impl Equations<'_> {
     /// The water's part of M(q).
     ///
     /// # Errors
-    /// As [`Equations::rigid_mass_matrix`].
+    /// As [`Equations::mass_matrix`].
     pub fn added_mass_matrix(&self) -> Result<DMatrix<f64>> {
-        Ok(self.mass_matrix() - self.rigid_mass_matrix()?)
+        Ok(self.mass_matrix()? - self.rigid_mass_matrix()?)
     }
 
     fn check(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<()> {
@@ -175,7 +180,9 @@ impl Equations<'_> {
         if given.iter().any(|x| *x != 0.0) {
             right -= self.at.mass_times(&given);
         }
-        Ok(given + self.at.factored(&free)?.solve(&right))
+        let found = given + self.at.factored(&free)?.solve(&right);
+        self.at.check()?;
+        Ok(found)
     }
 
     /// Inverse dynamics: the generalised forces τ at which the acceleration is `acceleration` (m/s², rad/s²); of driven joints what drives them.

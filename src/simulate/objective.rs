@@ -267,9 +267,11 @@ impl Term {
             }
             Of::Controls => return Vec::new(),
         };
-        let value = observable(name).and_then(|o| o.value(&rollout.reading(n)));
-        let miss =
-            |(k, goal): (usize, &f64)| value.as_ref().map_or(f64::NAN, |x| x[from + k]) - goal;
+        let found = observable(name).and_then(|o| Ok((o, o.value(&rollout.reading(n))?)));
+        let miss = |(k, goal): (usize, &f64)| match &found {
+            Ok((observable, value)) => observable.miss(value[from + k], *goal),
+            Err(_) => f64::NAN,
+        };
         self.target.iter().enumerate().map(miss).collect()
     }
 

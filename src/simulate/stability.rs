@@ -117,7 +117,7 @@ impl Rollout {
     fn worked(&self) -> Vec<f64> {
         let (system, dt) = (self.simulator.system(), self.simulator.time_step());
         let samples = self.samples();
-        if samples.iter().all(|s| s.control.iter().all(|u| *u == 0.0)) {
+        if system.controls == 0 {
             return vec![0.0; samples.len()];
         }
         let rates: Vec<DVector<f64>> = samples.iter().map(|s| control_rates(system, s)).collect();
@@ -189,7 +189,7 @@ impl Rollout {
     }
 }
 
-/// The rate that each control does work against.
+/// The rate that each control that is a force does work against.
 fn control_rates(system: &System, s: &Sample) -> DVector<f64> {
     let tree = &system.tree;
     let twists = tree.twists(&tree.kinematics(&s.q), &s.v);
@@ -209,6 +209,9 @@ fn control_rates(system: &System, s: &Sample) -> DVector<f64> {
                 out[first + 3 + k] = angular(twist)[k];
             }
         }
+    }
+    for target in system.forces.iter().flat_map(|f| f.targets()) {
+        out[target] = 0.0;
     }
     out
 }

@@ -44,8 +44,6 @@ pub(crate) struct Clearance {
     contact: bool,
     /// Volumes of the bodies, m³.
     volumes: Vec<f64>,
-    /// Number of the walls.
-    pub walls: usize,
     /// Whether the flow is made by sources inside the bodies, which no flat gap is resolved by.
     pub by_sources: bool,
     /// Whether the flow has a solution where bodies touch.
@@ -97,7 +95,6 @@ impl Clearance {
                 .iter()
                 .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume))
                 .collect(),
-            walls: scene.walls.len(),
             by_sources: false,
             may_touch: true,
             films: false,

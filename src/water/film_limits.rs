@@ -1,7 +1,7 @@
 //! Limits of thin films.
 
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
-use crate::coupling::film::{Film, FilmSurface, PlacedFilm, Shares, Side};
+use crate::coupling::film::{Film, FilmSurface, NoFilm, PlacedFilm, Shares, Side};
 use crate::geometry::{HalfSpace, Image, Opposite, Wall};
 use crate::scene::Shape;
 use crate::shape;
@@ -115,6 +115,8 @@ fn there_is_no_film_far_away_nor_in_touch() {
     let film = over_wall(&Shape::sphere(1.0), 320, 0.05);
     let placed = |height: f64| PlacedFilm::new(&film, &[raised(height)], &DMatrix::zeros(6, 0));
     assert!(placed(1.3).unwrap().is_none());
-    let behind = placed(0.99).err().unwrap();
+    let Err(NoFilm::Touching(behind)) = placed(0.99) else {
+        panic!("a disc behind a wall has no film");
+    };
     assert!((-0.011..0.0).contains(&behind), "{behind}");
 }

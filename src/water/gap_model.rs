@@ -8,7 +8,7 @@ use crate::coupling::film::{Extent, Films};
 use crate::geometry::{Gap, Other};
 use std::f64::consts::PI;
 
-/// Of the added mass, what films in the corner of two walls lose where both gaps are closed, of flat bodies; and the part of that for round ones.
+/// Of the added mass, what films that meet at a right angle lose where both gaps are closed, of flat bodies; and the part of that for round ones.
 const CORNER: f64 = 0.5;
 const ROUND_CORNER: f64 = 0.1;
 /// Distance beyond a gap within which surfaces count as near, in the larger of the gap and the edges there.
@@ -59,7 +59,7 @@ impl GapModel {
         let gaps = &clearance.moving;
         let distance = gap.distance.max(LEAST * gap.edge);
         // Between round surfaces the area within a distance d more than the gap is 2πRd.
-        let beyond = BEYOND * distance.max(gap.edge);
+        let beyond = beyond(gap);
         let near = gaps.near_faces(gap, beyond, poses);
         let area = near[0].area.max(near[1].area);
         let film = self.film(gap);
@@ -94,7 +94,7 @@ impl GapModel {
         Some(error)
     }
 
-    /// How far a body's films at two walls are into the corner between them, where each takes the other's gap for the open.
+    /// How far a gap's film, and others of its bodies, are into where they meet: each takes the other's gap for the open. Those on opposite sides of a body don't.
     fn corner(&self, clearance: &Clearance, gap: &Gap, poses: &[Pose]) -> f64 {
         let into = |gap: &Gap| {
             let reach = self.reach(gap).unwrap_or(0.0);
@@ -102,14 +102,28 @@ impl GapModel {
             if reach > 0.0 { part.powi(3) } else { 0.0 }
         };
         let own = into(gap);
-        if own == 0.0 || clearance.walls < 2 || !matches!(gap.second, Other::Wall(_)) {
+        if own == 0.0 {
             return 0.0;
         }
-        let walls = (0..clearance.walls).map(Other::Wall);
-        let others = walls.filter(|other| *other != gap.second);
-        let others = others
-            .filter_map(|other| clearance.moving.between((gap.first, other), poses))
-            .map(|other| into(&other));
-        own * others.fold(0.0, f64::max)
+        let gaps = &clearance.moving;
+        let bodies: Vec<usize> = gap.sides().map(|(b, _)| b).collect();
+        let facing = |of: &Gap, body: usize| {
+            let near = gaps.near_faces(of, beyond(of), poses);
+            let side = of.sides().position(|(b, _)| b == body)?;
+            near[side].facing.try_normalize(0.0)
+        };
+        let met = |other: &Gap| {
+            let body = bodies.iter().find(|b| other.touches(**b))?;
+            let cosine = facing(gap, *body)?.dot(&facing(other, *body)?);
+            Some(into(other) * (1.0 - cosine * cosine))
+        };
+        let near = gaps.within(poses, self.widest()).into_iter();
+        let others = near.filter(|o| (o.first, o.second) != (gap.first, gap.second));
+        own * others.filter_map(|o| met(&o)).fold(0.0, f64::max)
     }
+}
+
+/// How far beyond the nearest faces others count as being at a gap, m.
+fn beyond(gap: &Gap) -> f64 {
+    BEYOND * gap.distance.max(gap.edge)
 }

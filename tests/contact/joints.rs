@@ -4,7 +4,8 @@ use super::tools::{RAIL, under_gravity};
 use crate::support::{CONTACT_INTEGRATORS, GRAVITY, run, says, simulator};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Contact, Fluid, Joint, Motion, Scene, Shape};
-use hydrograd::{Fidelity, Rollout, Settings, Simulator};
+use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
+use nalgebra::DVector;
 use std::f64::consts::PI;
 
 const HINGE: Joint = Joint::Revolute {
@@ -46,6 +47,39 @@ fn gain(rollout: &Rollout) -> f64 {
     let first = rollout.samples()[0].energy();
     let each = rollout.samples().iter().map(|s| s.energy() - first);
     each.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// A joint that rests at its limit when the run starts is pressed a little: the step's derivatives are numbers, those of differences.
+#[test]
+fn a_joint_may_start_at_rest_at_its_limit() {
+    for integrator in CONTACT_INTEGRATORS {
+        let mut scene = slider();
+        scene.gravity = [0.0; 3];
+        scene.bodies[0].start = vec![0.3];
+        let sim = simulator(&scene, Fidelity::Isolated, integrator);
+        let end = |start: [f64; 2]| {
+            let mut sim = sim.clone();
+            let [q, v] = start.map(|x| DVector::from_element(1, x));
+            sim.set_start(q, v).unwrap();
+            sim.rollout(&Controls::zeros(&sim, 3)).unwrap()
+        };
+        let rollout = end([0.3, 0.0]);
+        assert!(rollout.samples()[3].v[0] < 0.0);
+        let mut seed = rollout.zero_cotangents();
+        seed.v[(0, 3)] = 1.0;
+        let gradient = rollout.vjp(&seed).unwrap().initial;
+        let by = |step: [f64; 2]| {
+            let at = |sign: f64| end([0.3 + sign * step[0], sign * step[1]]).samples()[3].v[0];
+            (at(1.0) - at(-1.0)) / (2.0 * step[0].max(step[1]))
+        };
+        let h = 1e-7;
+        let right = [by([h, 0.0]), by([0.0, h])];
+        let found = [gradient.q[0], gradient.v[0]];
+        for (found, right) in found.into_iter().zip(right) {
+            let off = (found - right).abs() / right.abs().max(1.0);
+            assert!(off < 1e-5, "{integrator:?}: {found} for {right}");
+        }
+    }
 }
 
 /// It goes past its limit by an eleventh of what it would in the step that reaches it, and rests where the smoothed

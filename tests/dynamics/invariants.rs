@@ -1,6 +1,6 @@
 //! What motion in an ideal fluid conserves, how integrators converge, and what can be told without computing.
 
-use crate::support::{INTEGRATORS, example};
+use crate::support::{INTEGRATORS, check_gradient, example};
 use hydrograd::adjoint::lie::Vec6;
 use hydrograd::dynamics::{Input, Integrator, State};
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Motion, Scene, Shape};
@@ -102,6 +102,46 @@ fn energy_euler_keeps_the_energy_of_bodies_that_pass_each_other() {
         println!("{walls} walls: {errors:?}");
         assert!(errors[0] <= 1e-12 && errors[1] >= 1e-4, "{errors:?}");
     }
+}
+
+/// A ball on a rail is pushed past a coin, and held there: what both could do together isn't among what the correction spares any more, and gradients know it.
+#[test]
+fn energy_euler_keeps_energy_beside_a_joint_that_is_held() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let axis = [1.0, 0.0, 0.0];
+    let ball = Body::new(Shape::sphere(0.06).faces(80)).named("ball");
+    scene.add(
+        ball.density(1100.0)
+            .joint(Joint::Prismatic { axis })
+            .actuated(),
+    );
+    let coin = Body::new(Shape::ellipsoid([0.05, 0.04, 0.02]).faces(80));
+    scene.add(coin.density(1300.0).at([0.1, 0.09, 0.02]));
+    scene.controller = Some(Controller::PushThenLock {
+        body: "ball".into(),
+        force: 30.0,
+        stop_at: 0.02,
+    });
+    scene.initial.v = vec![0.3, 0.2, -0.05, 0.1, 1.0, 0.5, -0.7];
+    scene.time_step = 5e-3;
+    let mut sim = simulator(&scene, Fidelity::Reduced, Integrator::EnergyEuler);
+    let all = samples(&sim, 100);
+    let first = all
+        .iter()
+        .position(|s| s.hold.first() == Some(&true))
+        .unwrap();
+    let held = &all[first + 1..];
+    assert!(first > 5 && held.len() > 50, "held from step {first} on");
+    let energy = held[0].energy();
+    let errors = held.iter().map(|s| (s.energy() / energy - 1.0).abs());
+    let worst = errors.fold(0.0, f64::max);
+    println!("held from step {first} on: {worst:.1e}");
+    assert!(worst < 1e-11, "{worst:e}");
+    // Past where it is held, which no gradient sees.
+    scene.initial.q = vec![0.03];
+    scene.initial.q.extend(sim.start().0.iter().skip(1));
+    sim = simulator(&scene, Fidelity::Reduced, Integrator::EnergyEuler);
+    check_gradient("held", &mut sim, 20, 3, 1e-6);
 }
 
 #[test]

@@ -151,6 +151,24 @@ fn a_damper_takes_energy_and_ends_may_meet() {
     assert!(energies[50] < 0.9 * energies[0], "{energies:?}");
 }
 
+/// Without a rest length a spring is linear where its ends meet: gradients from there are those of an oscillator.
+#[test]
+fn a_spring_without_length_has_a_slope_where_its_ends_meet() {
+    let mut scene = Scene::new(Fluid::none());
+    scene.add(dry("weight", Joint::Free));
+    scene.add_force(Spring::new("weight").stiffness(50.0).into());
+    let sim = simulator(&scene, Integrator::Rk4);
+    let rollout = sim.rollout(&Controls::zeros(&sim, 100)).unwrap();
+    let mut seed = rollout.zero_cotangents();
+    seed.q[(0, 100)] = 1.0;
+    let gradient = rollout.vjp(&seed).unwrap();
+    let omega = f64::sqrt(50.0 / 2.0);
+    let right = (omega * rollout.samples()[100].time).sin() / omega;
+    let found = gradient.initial.v[0];
+    assert!((found - right).abs() < 1e-6, "{found} for {right}");
+    gradients(&scene, Integrator::MomentumEuler);
+}
+
 #[test]
 fn springs_that_can_not_be_are_refused() {
     let refused = |spring: Spring, words: &[&str]| {

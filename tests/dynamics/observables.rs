@@ -1,11 +1,13 @@
 //! Observables by name: what they read, what they seed, and what is refused.
 
 use crate::support::says;
+use hydrograd::optimize::{Cost, Guess, IlqrProgress, IlqrSettings, Problem, ilqr, terms};
 use hydrograd::scene::{Body, BodyId, Contact, Fluid, Scene, Site};
 use hydrograd::simulate::observable::OBSERVABLES;
-use hydrograd::simulate::{Checkpoints, Partwise, Recording, Rollout};
+use hydrograd::simulate::{Checkpoints, Objective, Partwise, Recording, Rollout};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
 use nalgebra::DMatrix;
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 /// A dry body that tumbles without any force.
@@ -251,4 +253,31 @@ fn accelerations_have_derivatives() {
             &[name, "in parts", "whole rollout"],
         );
     }
+}
+
+/// Attitudes miss what they are to be by the shorter way round, in objectives and in costs of optimal control.
+#[test]
+fn attitudes_miss_by_the_shorter_way_round() {
+    let mut scene = Scene::new(Fluid::none());
+    let body = Body::dry().mass(2.0).inertia([0.1, 0.2, 0.28]).thruster();
+    scene.add(body.rotated([0.0, 0.0, -3.1]));
+    let settings = Settings::default().fidelity(Fidelity::Isolated);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 2)).unwrap();
+    let miss = TAU - 6.2;
+    let goal = objective::final_observable("attitudes", 2, 3.1, 1.0);
+    let cost = goal.value(&rollout);
+    assert!((cost - miss * miss).abs() < 1e-12, "{cost}");
+    let turned = rollout.gradient(&goal).unwrap().initial.q[5];
+    assert!((turned - 2.0 * miss).abs() < 1e-9, "{turned}");
+    let cost = Cost::default().last(terms::observable("attitudes", [2], [3.1], 1.0));
+    let problem = Problem::new(2, cost);
+    let start = simulator.initial().unwrap();
+    let settings = IlqrSettings {
+        iterations: 0,
+        ..IlqrSettings::default()
+    };
+    let on = |_: &IlqrProgress| ControlFlow::Continue(());
+    let plan = ilqr(&simulator, &start, &problem, Guess::Zero, &settings, on).unwrap();
+    assert!((plan.cost() - miss * miss).abs() < 1e-12, "{}", plan.cost());
 }

@@ -195,6 +195,70 @@ fn rollouts_through_the_surface_have_gradients() {
     }
 }
 
+/// What a scene says a body is buoyant by, and where, holds under a surface too, of a body without a shape as well.
+#[test]
+fn given_volumes_and_centres_are_buoyant_below_a_surface() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -GRAVITY];
+    scene.waterline = Some(HEIGHT);
+    let (volume, center) = (0.05, [0.01, -0.02, 0.06]);
+    for (k, body) in [
+        Body::dry(),
+        Body::new(Shape::cuboid([0.5, 0.4, 0.3]).faces(80)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let body = body.named(format!("body {k}")).mass(DENSITY * volume);
+        let body = body.inertia([1.0, 1.2, 0.8]).center_of_mass([0.0; 3]);
+        let mut body = body.at([2.0 * k as f64, 0.0, HEIGHT - 5.0]);
+        (body.volume, body.center_of_buoyancy) = (Some(volume), Some(center));
+        scene.add(body);
+    }
+    let deep = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    let mut endless = scene.clone();
+    endless.waterline = None;
+    let endless = simulator(&endless, Fidelity::Isolated, Integrator::Rk4);
+    let force = |sim: &Simulator| {
+        let e = sim.equations(sim.start().0).unwrap();
+        let still = DVector::zeros(12);
+        -e.bias_force(&still, &DVector::zeros(0)).unwrap()
+    };
+    let (found, right) = (force(&deep), force(&endless));
+    let weight = DENSITY * volume * GRAVITY;
+    assert!(
+        (&found - &right).amax() < 1e-12 * weight,
+        "{found} for {right}"
+    );
+    assert!(found[0].abs().max(found[2].abs()) < 1e-12 * weight);
+    assert!((found[3] / (weight * center[1]) - 1.0).abs() < 1e-9);
+    // Through the surface with energy kept, and gradients with all parameters.
+    for body in &mut scene.bodies {
+        body.placement.position[2] = HEIGHT;
+        body.placement.rotation = [0.2, -0.1, 0.3];
+        body.mass = Some(0.6 * DENSITY * volume);
+    }
+    scene.time_step = 2e-3;
+    let mut sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    let rollout = sim.rollout(&Controls::zeros(&sim, 1000)).unwrap();
+    let samples = rollout.samples();
+    let kinetic = samples.iter().map(|s| s.kinetic_energy);
+    let (scale, first) = (kinetic.fold(0.0, f64::max), samples[0].energy());
+    for s in samples {
+        let error = (s.energy() - first) / scale;
+        assert!(error.abs() < 2e-4, "{error:.1e} at {} s", s.time);
+    }
+    let settings = GradcheckSettings {
+        steps: 30,
+        directions: 3,
+        seed: 5,
+        timings: 0,
+        enough: Some(1e-6),
+    };
+    let report = gradcheck(&mut sim, &settings).unwrap();
+    assert!(report.max_rel_error < 1e-6, "{report:?}");
+}
+
 /// A surface needs gravity.
 #[test]
 fn a_surface_without_gravity_is_refused() {

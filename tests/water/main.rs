@@ -2,6 +2,7 @@
 
 mod analytic;
 mod auto;
+mod corners;
 mod estimate;
 mod exact;
 mod films;

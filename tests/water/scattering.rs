@@ -286,6 +286,32 @@ fn wrenches_add_up_to_nothing_and_are_slopes_of_the_energy() {
         let by = (8.0 * (sides[0][b] - sides[1][b]) - sides[2][b] + sides[3][b]) / (12.0 * h);
         assert!((found - by).amax() < 1e-6 * size, "body {b}: {found} {by}");
     }
+    // Of two directions they are linear in each, however small it is.
+    let other = DVector::from_fn(6 * 27, |_, _| 0.5 * drawn.number());
+    let (slopes, whole) = both_of(at.as_ref(), &twists, &other, &z);
+    for scale in [1e-12, 1e9] {
+        let (part, rate) = both_of(at.as_ref(), &twists, &(scale * &other), &z);
+        for (all, some) in [(&slopes, &part), (&whole.wrench, &rate.wrench)] {
+            let size = all.iter().map(Vec6::amax).fold(0.0, f64::max);
+            let off = all.iter().zip(some).map(|(a, b)| (a - b / scale).amax());
+            assert!(off.fold(0.0, f64::max) < 1e-9 * size, "{scale:.0e}");
+        }
+        let size = whole.momentum_y.amax();
+        let off = (&whole.momentum_y - &rate.momentum_y / scale).amax();
+        assert!(off < 1e-9 * size, "{scale:.0e}: {:.1e}", off / size);
+    }
+}
+
+/// Slopes of the energy of two twists, and their tangent.
+fn both_of(
+    at: &dyn hydrograd::coupling::Linearised,
+    x: &DVector<f64>,
+    y: &DVector<f64>,
+    z: &[Vec6],
+) -> (Vec<Vec6>, hydrograd::coupling::Tangent) {
+    let of = |x| Direction::Twist(x);
+    let pulled = at.vjp(of(x), of(y)).unwrap();
+    (pulled.wrench, at.hvp(of(x), of(y), z).unwrap())
 }
 
 /// Spheres and ellipsoids, free, moving at random.

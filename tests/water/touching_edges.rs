@@ -7,11 +7,11 @@ use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DMatrix;
 
 /// Gaps, m, of bodies of about 4 cm.
-const GAPS: [f64; 3] = [2e-5, 2e-4, 1e-3];
+pub const GAPS: [f64; 3] = [2e-5, 2e-4, 1e-3];
 /// Condition number that tells of nothing but near bodies: with a smaller hold it was 500, and every tenth pose had no solution.
-const MOST: f64 = 10.0;
+pub const MOST: f64 = 10.0;
 
-fn shapes(size: f64) -> [Shape; 3] {
+pub fn shapes(size: f64) -> [Shape; 3] {
     let [a, b, c] = [0.03, 0.022, 0.016].map(|x| x * size);
     let corners = vec![[-b, -c], [-0.7 * b, c], [0.8 * b, c], [b, -c]];
     [
@@ -19,6 +19,19 @@ fn shapes(size: f64) -> [Shape; 3] {
         Shape::cylinder(c, 1.5 * a).faces(80),
         Shape::prism(corners, 1.2 * a).faces(80),
     ]
+}
+
+/// The way along which a gap first is `wanted`, m.
+pub fn moved(wanted: f64, gap: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 0.2);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        match gap(middle) > wanted {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    high
 }
 
 /// The coupling of these bodies at random turns, half of which leave faces nearly parallel, moved along an axis until the gap is narrow; how many turns have no solution, and the largest
@@ -55,15 +68,7 @@ fn tried(shapes: &[Shape], wall: bool, accuracy: f64, turns: usize) -> (usize, f
                 .collect()
         };
         let gap = |way: f64| simulator.gaps().smallest(&at(way)).unwrap().distance;
-        let (mut low, mut high) = (0.0, 0.2);
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            match gap(middle) > GAPS[k % 3] {
-                true => high = middle,
-                false => low = middle,
-            }
-        }
-        match coupling.evaluate(&at(high), &basis) {
+        match coupling.evaluate(&at(moved(GAPS[k % 3], gap)), &basis) {
             Ok(found) => worst = worst.max(found.report().condition),
             Err(error) => {
                 println!("{error}");

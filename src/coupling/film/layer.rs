@@ -194,6 +194,15 @@ impl<D: Jet> Layer<D> {
         Some(out)
     }
 
+    /// The least distance at which vertices with a potential are held apart, m.
+    pub fn least_held(&self) -> f64 {
+        let held = self
+            .active
+            .iter()
+            .map(|s| self.spots[*s].distances[1].value.re());
+        held.fold(f64::INFINITY, f64::min)
+    }
+
     /// Where the film ends: which vertices have a potential, unless that is known, and how well each leads into the open.
     fn bound(&mut self, film: &Film, known: Option<&Layer<f64>>) {
         for s in 0..self.spots.len() {

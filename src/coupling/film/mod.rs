@@ -35,7 +35,7 @@ mod water;
 
 pub(crate) use apart::Apart;
 pub(crate) use bodies::FilmBody;
-pub(crate) use placed::{MovingFilm, PlacedFilm};
+pub(crate) use placed::{MovingFilm, NoFilm, PlacedFilm};
 pub(crate) use set::{Films, MovingFilms, PlacedFilms};
 pub(crate) use surface::{FilmSurface, TOGETHER};
 pub(crate) use water::Beside;

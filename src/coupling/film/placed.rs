@@ -35,6 +35,15 @@ pub(crate) struct PlacedFilm {
     reverse: OnceLock<Reverse<f64>>,
 }
 
+/// Why there is no film where there should be one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum NoFilm {
+    /// A distance that isn't positive, m.
+    Touching(f64),
+    /// The two can't be held apart: the gap, and the least distance at which they then would be, m.
+    Squeezed { gap: f64, held: f64 },
+}
+
 /// The potential of twists of both sides, frame of the first, as the film is and held apart.
 struct Solved {
     twists: [Vec6; 2],
@@ -55,25 +64,32 @@ pub(crate) struct MovingFilm<'a> {
 }
 
 impl PlacedFilm {
-    /// For a basis of body-frame twists. None where the gap is wide. `Err`: a distance that isn't positive, or 0 where the film has no solution.
+    /// For a basis of body-frame twists. None where the gap is wide.
     pub fn new(
         film: &Arc<Film>,
         poses: &[Pose],
         basis: &DMatrix<f64>,
-    ) -> Result<Option<Self>, f64> {
+    ) -> Result<Option<Self>, NoFilm> {
         let frame = match film.other {
             Side::Body(b) => poses[b],
             Side::Wall(_) => Pose::identity(),
         };
         let relative = frame.inverse().compose(&poses[film.body]);
         let still = Displaced::new(&relative, &Vec6::zeros());
-        let Some(near) = film.near(&still)? else {
+        let Some(near) = film.near(&still).map_err(NoFilm::Touching)? else {
             return Ok(None);
         };
         let Some(layer) = Layer::new(film, &still, &near, None) else {
             return Ok(None);
         };
-        let system = film.system(&layer).ok_or(0.0)?;
+        let squeezed = || NoFilm::Squeezed {
+            gap: layer.gap.value,
+            held: layer.least_held(),
+        };
+        if layer.least_held() <= 0.0 {
+            return Err(squeezed());
+        }
+        let system = film.system(&layer).ok_or_else(squeezed)?;
         let mut out = Self {
             film: film.clone(),
             relative,

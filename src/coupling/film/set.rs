@@ -2,7 +2,7 @@
 
 use super::bodies::FilmBody;
 use super::placed::{MovingFilm, PlacedFilm};
-use super::{Apart, Beside, Extent, Film, Shares, Side};
+use super::{Apart, Beside, Extent, Film, NoFilm, Shares, Side};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::Exclusions;
 use crate::error::in_order;
@@ -238,7 +238,7 @@ impl Films {
         let films = self.films(&near);
         let place = |film| {
             let placed = PlacedFilm::new(film, poses, basis);
-            placed.map_err(|distance| touching(film, distance, names))
+            placed.map_err(|why| refused(film, why, names))
         };
         let placed = in_order(films.par_iter().map(place))?;
         Ok(PlacedFilms::new(placed.into_iter().flatten().collect()))
@@ -261,17 +261,32 @@ impl Films {
     }
 }
 
-fn touching(film: &Film, value: f64, names: &[String]) -> Error {
+fn refused(film: &Film, why: NoFilm, names: &[String]) -> Error {
     let own = format!("body {:?}", names[film.body]);
+    let (quantity, value, remedy) = match why {
+        NoFilm::Touching(gap) => (
+            "gap in m",
+            gap,
+            "the water has no flow between surfaces that touch: hold them apart by contact with a gap, or end the run before".into(),
+        ),
+        NoFilm::Squeezed { gap, held } => (
+            "least distance in m at which a film would hold them apart",
+            held,
+            format!(
+                "their gap is about {gap:.3e} m, on two sides at once, as of a peg in its hole, and a film holds bodies apart in one direction: leave them more room, \
+                 or use the fidelity full without films"
+            ),
+        ),
+    };
     Error::Unresolved {
         place: match film.other {
             Side::Body(b) => format!("{own} and body {:?}", names[b]),
             Side::Wall(_) => format!("{own} and a wall"),
         },
-        quantity: "gap in m".into(),
+        quantity: quantity.into(),
         value,
         limit: 0.0,
-        remedy: "the water has no flow between surfaces that touch: hold them apart by contact with a gap, or end the run before".into(),
+        remedy,
     }
 }
 

@@ -75,7 +75,7 @@ pub struct Fit {
     pub body_asymmetry: f64,
     /// Estimated relative error of the body's own added mass, where two resolutions tell one.
     pub body_error: Option<f64>,
-    /// What the user should know, each with the body's name and its numbers.
+    /// What the user should know, with its numbers; without the body's name, as it may be kept for others that are made alike.
     pub warnings: Vec<String>,
 }
 

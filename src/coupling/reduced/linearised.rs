@@ -228,7 +228,7 @@ impl<'a> ReducedLinearised<'a> {
                 };
                 Fields { field, sums }
             };
-            self.placed.iter().map(one).collect()
+            self.reduced.over(&self.placed, columns * PULL, one)
         })
     }
 

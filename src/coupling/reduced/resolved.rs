@@ -39,11 +39,11 @@ impl Reduced {
     }
 }
 
-/// What the pair of bodies that come closest doesn't resolve.
+/// What the pair of bodies that come closest, against what they resolve, doesn't.
 fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Error {
     let parts = |b: usize| reduced.bodies[b].parts();
     let world = |b: usize, p: &Vec3| poses[b].apply(p);
-    let mut worst = (f64::INFINITY, String::from("all bodies"), 0.0);
+    let mut worst = (f64::INFINITY, String::from("all bodies"), [0.0; 2]);
     for link in &reduced.links {
         let (t, s) = (parts(link.target), parts(link.source));
         let seen = |p: &Vec3| link.image.linear * world(link.source, p) + link.image.shift;
@@ -56,7 +56,10 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
                 .fold(f64::INFINITY, f64::min)
         };
         let d = t.points.iter().map(distance).fold(f64::INFINITY, f64::min);
-        if d < worst.0 {
+        // Sources lie as deep as the gap asks for: those of small bodies are always nearer to each other.
+        let resolved = t.fit.resolved_gap.max(s.fit.resolved_gap);
+        let nearness = d / resolved.max(f64::MIN_POSITIVE);
+        if nearness < worst.0 {
             let of = |name: &str| format!("body {name:?}");
             let (one, other) = (&reduced.names[link.target], &reduced.names[link.source]);
             let place = match (link.target == link.source, link.image.is_identity()) {
@@ -64,10 +67,10 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
                 (false, true) => format!("{} and {}", of(one), of(other)),
                 (false, false) => format!("{} and {} by a wall", of(one), of(other)),
             };
-            worst = (d, place, t.fit.resolved_gap.max(s.fit.resolved_gap));
+            worst = (nearness, place, [d, resolved]);
         }
     }
-    let (distance, place, resolved) = worst;
+    let (_, place, [distance, resolved]) = worst;
     Error::Unresolved {
         place,
         quantity: format!(

@@ -3,7 +3,7 @@
 use super::Scattering;
 use super::answers::Recoiled;
 use super::kept::Answer;
-use super::scattered::{Motions, Moving, Scattered, mixed, plus};
+use super::scattered::{Motions, Moving, Scattered, balance, mixed, plus};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::reduced::FLUX;
@@ -162,11 +162,10 @@ impl<'a> ScatteredLinearised<'a> {
         }
     }
 
-    /// Of one direction's charges with themselves, as bodies are displaced.
-    fn bent(&self, moving: &Moving, charges: &[f64]) -> Bent {
+    /// The rates of charges as bodies are displaced.
+    fn rates(&self, moving: &Moving, charges: &[f64]) -> Vec<f64> {
         let at = &self.at;
-        let rates = at.answering(&at.tangent_potentials(moving, charges));
-        bent(at, moving, charges, &rates)
+        at.answering(&at.tangent_potentials(moving, charges))
     }
 
     /// The rate of the impulses of an answer as bodies are displaced.
@@ -243,7 +242,8 @@ impl Linearised for ScatteredLinearised<'_> {
         let (x, y) = (self.respond(&x), self.respond(&y));
         // A spin that makes no charges may move a film.
         let out = if x.charges == y.charges && x.twists == y.twists {
-            let mut bent = self.bent(&moving, &x.charges);
+            let rates = self.rates(&moving, &x.charges);
+            let mut bent = bent(at, &moving, &x.charges, &rates);
             bent.add_films(&moving, &x.twists);
             Tangent {
                 momentum_x: bent.impulses.clone(),
@@ -252,13 +252,18 @@ impl Linearised for ScatteredLinearised<'_> {
                 wrench: bent.rate,
             }
         } else {
-            let [sum, difference] =
-                [1.0, -1.0].map(|sign| self.bent(&moving, &plus(&x.charges, sign, &y.charges)));
+            // Each is solved to its own size.
+            let [dx, dy] = [&x, &y].map(|of| self.rates(&moving, &of.charges));
+            let part = balance(&x.charges, &y.charges);
+            let [sum, difference] = [part, -part].map(|part| {
+                let charges = plus(&x.charges, part, &y.charges);
+                bent(at, &moving, &charges, &plus(&dx, part, &dy))
+            });
             let mut out = Tangent {
                 momentum_x: 0.5 * (&sum.impulses + &difference.impulses),
-                momentum_y: 0.5 * (&sum.impulses - &difference.impulses),
-                gradient: mixed(&sum.gradient, &difference.gradient),
-                wrench: mixed(&sum.rate, &difference.rate),
+                momentum_y: (0.5 / part) * (&sum.impulses - &difference.impulses),
+                gradient: mixed(&sum.gradient, &difference.gradient, part),
+                wrench: mixed(&sum.rate, &difference.rate, part),
             };
             let mut impulses = [out.momentum_x, out.momentum_y];
             let wrenches = (&mut out.gradient[..], &mut out.wrench[..]);

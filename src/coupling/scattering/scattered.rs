@@ -267,8 +267,9 @@ impl Scattered<'_> {
         if x == y {
             return self.gradient(x);
         }
-        let [sum, difference] = [1.0, -1.0].map(|sign| self.gradient(&plus(x, sign, y)));
-        mixed(&sum, &difference)
+        let part = balance(x, y);
+        let [sum, difference] = [part, -part].map(|part| self.gradient(&plus(x, part, y)));
+        mixed(&sum, &difference, part)
     }
 
     /// The places as the bodies are displaced.
@@ -397,14 +398,23 @@ fn combined(a: &DMatrix<f64>, x: &[f64]) -> Vec<f64> {
     out
 }
 
-/// x + `sign` y.
-pub(super) fn plus(x: &[f64], sign: f64, y: &[f64]) -> Vec<f64> {
+/// x + `part` y.
+pub(super) fn plus(x: &[f64], part: f64, y: &[f64]) -> Vec<f64> {
     let each = x.iter().zip(y);
-    each.map(|(x, y)| x + sign * y).collect()
+    each.map(|(x, y)| x + part * y).collect()
 }
 
-/// Of a quadratic form's values at x + y and at x − y its bilinear one's at x and y.
-pub(super) fn mixed(sum: &[Vec6], difference: &[Vec6]) -> Vec<Vec6> {
+/// How much of y is as large as x: a sum of both as they come would hold none of the digits of one that is much smaller. One where either is nothing.
+pub(super) fn balance(x: &[f64], y: &[f64]) -> f64 {
+    let part = (dot(x, x) / dot(y, y)).sqrt();
+    match part.is_normal() {
+        true => part,
+        false => 1.0,
+    }
+}
+
+/// Of a quadratic form's values at x + `part` y and at x − `part` y its bilinear one's at x and y.
+pub(super) fn mixed(sum: &[Vec6], difference: &[Vec6], part: f64) -> Vec<Vec6> {
     let each = sum.iter().zip(difference);
-    each.map(|(s, d)| 0.25 * (s - d)).collect()
+    each.map(|(s, d)| (s - d) * (0.25 / part)).collect()
 }

@@ -328,6 +328,11 @@ pub trait ForceModel: Send + Sync {
         0.0
     }
 
+    /// Controls of joints that are where these are to be, and no forces.
+    fn targets(&self) -> Vec<usize> {
+        Vec::new()
+    }
+
     /// Forces along fixed lines of bodies that controls command, at these parameters.
     fn commanded(&self, _parameters: &Parameters) -> Vec<Commanded> {
         Vec::new()

@@ -42,6 +42,12 @@ pub(super) fn assemble(
 }
 
 impl Servos {
+    /// τ.
+    fn force(&self, s: &Servo, at: &Moving) -> f64 {
+        let parameters = at.place.parameters;
+        parameters[s.stiffness] * self.error(s, at) - parameters[s.damping] * at.v[s.v]
+    }
+
     /// What is left to the target.
     fn error(&self, s: &Servo, at: &Moving) -> f64 {
         at.control[s.control] - at.place.q[s.q] - self.time_step * at.v[s.v]
@@ -59,10 +65,8 @@ impl ForceModel for Servos {
     }
 
     fn add(&self, at: &Moving, out: &mut Loads) {
-        let parameters = at.place.parameters;
         for s in &self.each {
-            out.joints[s.v] +=
-                parameters[s.stiffness] * self.error(s, at) - parameters[s.damping] * at.v[s.v];
+            out.joints[s.v] += self.force(s, at);
         }
     }
 
@@ -93,5 +97,16 @@ impl ForceModel for Servos {
             true => Outside::All,
             false => Outside::Nothing,
         }
+    }
+
+    fn driven_power(&self, at: &Moving) -> f64 {
+        self.each
+            .iter()
+            .map(|s| self.force(s, at) * at.v[s.v])
+            .sum()
+    }
+
+    fn targets(&self) -> Vec<usize> {
+        self.each.iter().map(|s| s.control).collect()
     }
 }

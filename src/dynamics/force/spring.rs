@@ -1,7 +1,7 @@
 //! Linear springs with dampers between points of two bodies, or of a body and the world.
 //!
 //! With d from the first end to the second, n = d/|d| and u = ḋ, the tension is T = k (|d| − L) + c n·u; T n acts on the first
-//! body, −T n on the second. Where the ends meet there is no direction, and nothing acts.
+//! body, −T n on the second. Where the ends meet there is no direction, and nothing acts; without a rest length the force k d has a slope there all the same.
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench};
@@ -154,11 +154,15 @@ impl ForceModel for Springs {
     fn vjp(&self, at: &Moving, z: &Velocity, bar: &mut LoadBars) {
         for spring in &self.0 {
             let s = spring.stretched(at);
-            if s.length == 0.0 {
-                continue;
-            }
             let parameters = at.place.parameters;
             let (stiffness, damping) = (parameters[spring.stiffness], parameters[spring.damping]);
+            if s.length == 0.0 {
+                if parameters[spring.rest_length] == 0.0 {
+                    let d_bar = -stiffness * spring.rate(&s.ends, z.twists);
+                    spring.pull(&s.ends, &-d_bar, bar.pose);
+                }
+                continue;
+            }
             let n = &s.normal;
             // The power is T n·w, w the rate at which the virtual velocity shortens the spring.
             let w = -spring.rate(&s.ends, z.twists);

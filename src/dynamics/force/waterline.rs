@@ -1,11 +1,16 @@
 //! Buoyancy of bodies that reach through the surface of still water: ρ |g| V upward at the centroid of the volume V below it.
 //!
+//! A body is buoyant at the centre that its parameters give: its surface is moved there, for the water's surface as well, so that an energy stays that the force is
+//! the slope of.
+//!
 //! With N = ∫ x dV over that volume and h the surface's height, the wrench is ρ |g| (V e, N × e), e upward, and the energy ρ |g| (h V − e·N), whose slope it is.
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
-use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear, six};
+use crate::adjoint::lie::{Vec3, Vec6, angular, linear, six};
 use crate::adjoint::waterline::{Below, Hull};
-use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, Parameters, volume};
+use crate::dynamics::parameters::{
+    DENSITY, Declarations, Parameter, Parameters, center_of_buoyancy, volume,
+};
 
 /// The surface of still water, or where depths are counted from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +42,9 @@ struct Floater {
     volume: Parameter,
     /// That of its mesh, m³.
     mesh_volume: f64,
+    /// Where that is to be centred, and where its own centre is, body's frame, m.
+    center: [Parameter; 3],
+    mesh_center: Vec3,
     /// With shape parameters a little larger and smaller by the step.
     changed: Vec<(Parameter, f64, [Box<Floater>; 2])>,
 }
@@ -68,22 +76,27 @@ pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<d
 
 impl Floater {
     fn new(body: usize, hull: Hull) -> Option<Self> {
-        let mesh_volume = Below::new(&hull, &Vec3::z(), f64::INFINITY).volume;
-        (mesh_volume > 0.0).then_some(Self {
+        let whole = Below::new(&hull, &Vec3::z(), f64::INFINITY);
+        (whole.volume > 0.0).then_some(Self {
             body,
             hull,
             volume: volume(body),
-            mesh_volume,
+            mesh_volume: whole.volume,
+            center: center_of_buoyancy(body),
+            mesh_center: whole.moment / whole.volume,
             changed: Vec::new(),
         })
     }
 
     /// What its mesh displaces, in the world.
-    fn displaced(&self, surface: &Waterline, pose: &Pose) -> Below {
+    fn displaced(&self, surface: &Waterline, place: &Place) -> Below {
+        let mut pose = place.poses[self.body];
+        let moved = place.parameters.point(self.center) - self.mesh_center;
+        pose.translation += pose.rotation * moved;
         let normal = pose.rotation.tr_mul(&surface.up);
         let height = surface.depth(&pose.translation);
         let own = Below::new(&self.hull, &normal, height);
-        own.moved(pose)
+        own.moved(&pose)
     }
 
     /// The body's volume over that of its mesh.
@@ -123,7 +136,7 @@ impl ForceModel for Floating {
     fn add(&self, at: &Moving, out: &mut Loads) {
         let weight = self.weight(at.place.parameters);
         for hull in &self.hulls {
-            let displaced = hull.displaced(&self.surface, &at.place.poses[hull.body]);
+            let displaced = hull.displaced(&self.surface, &at.place);
             let weight = weight * hull.fill(at.place.parameters);
             out.wrenches[hull.body] += weight * wrench(&displaced, &self.surface.up);
         }
@@ -133,16 +146,22 @@ impl ForceModel for Floating {
         let weight = self.weight(at.place.parameters);
         for hull in &self.hulls {
             let (up, virt) = (&self.surface.up, &z.twists[hull.body]);
-            let displaced = hull.displaced(&self.surface, &at.place.poses[hull.body]);
+            let displaced = hull.displaced(&self.surface, &at.place);
             let fill = hull.fill(at.place.parameters);
-            bar.pose[hull.body] += weight * fill * wrench_vjp(&displaced, up, virt);
+            let pose_bar = weight * fill * wrench_vjp(&displaced, up, virt);
+            bar.pose[hull.body] += pose_bar;
+            // The surface is displaced alone.
+            let turned = at.place.poses[hull.body]
+                .rotation
+                .tr_mul(&linear(&pose_bar));
+            bar.parameters.add_point(hull.center, &turned);
             let power = wrench(&displaced, up).dot(virt);
             bar.parameters[DENSITY] += self.gravity * fill * power;
             bar.parameters[hull.volume] += weight / hull.mesh_volume * power;
             for (parameter, step, both) in &hull.changed {
-                // At a given volume: that follows by itself.
+                // At a given volume and centre: these follow by themselves.
                 let [more, less] = both.each_ref().map(|changed| {
-                    let displaced = changed.displaced(&self.surface, &at.place.poses[hull.body]);
+                    let displaced = changed.displaced(&self.surface, &at.place);
                     changed.fill(at.place.parameters) * wrench(&displaced, up).dot(virt)
                 });
                 bar.parameters[*parameter] += weight * (more - less) / (2.0 * step);
@@ -167,7 +186,7 @@ impl ForceModel for Floating {
 
     fn potential_energy(&self, place: &Place) -> f64 {
         let of = |hull: &Floater| {
-            let below = hull.displaced(&self.surface, &place.poses[hull.body]);
+            let below = hull.displaced(&self.surface, place);
             let unit = self.surface.height * below.volume - self.surface.up.dot(&below.moment);
             hull.fill(place.parameters) * unit
         };

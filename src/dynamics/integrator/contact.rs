@@ -249,6 +249,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             - inertia.along(along.q, None, along.inputs);
         let mut after = before.clone();
         let free = hessian.solve_columns(&split.take_rows(&right));
+        e.check()?;
         for (k, &i) in split.free.iter().enumerate() {
             after.row_mut(i).copy_from(&free.row(k));
         }

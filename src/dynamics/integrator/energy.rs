@@ -15,7 +15,9 @@
 //! p̂⁺ = p̂* + (s − 1) X⁻ᵀ M(q⁺) e      s² = 1 − c(φ δ / ½ eᵀ M(q⁺) e)      (Bᵀ M B) ω = Bᵀ p*
 //! ```
 //!
-//! c is the identity up to ¼ and bounded by ½. φ = 1 / (1 + r) fades out where contact takes speed, by r = |v_s − v|²_M / (10⁻⁴ |v|²_M): an impact loses more than this accounts for.
+//! A motion of B that would move a joint that is held isn't one of all bodies together, and isn't among them.
+//!
+//! c is the identity up to ¼ and bounded by ½. φ = 10⁻⁴ |v|²_M / (10⁻⁴ |v|²_M + |v_s − v|²_M) fades out where contact takes speed: an impact loses more than this accounts for.
 //!
 //! This is a projection on the energy (Hairer, Lubich, Wanner, "Geometric Numerical Integration", IV.4) in the one direction that keeps momenta.
 
@@ -24,7 +26,7 @@ use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents, readout};
 use crate::adjoint::solve::Definite;
 use crate::dynamics::slopes::columns;
-use crate::dynamics::{Dual, Evaluation, Linearisation};
+use crate::dynamics::{Dual, Evaluation, Linearisation, Motions};
 use crate::error::in_order;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -51,10 +53,16 @@ fn closes(start: &Start) -> bool {
     let still = &split.driven - drift.velocity();
     let mut driven = split.is_driven.iter().zip(still.iter());
     drift.is_whole()
-        && s.system.symmetric.len() < split.free.len()
+        && common(start).len() < split.free.len()
         && !split.moved.contains(&true)
         && driven.all(|(driven, v)| !driven || *v == 0.0)
         && s.split_at(start.state).is_driven == split.is_driven
+}
+
+/// The rigid motions of all bodies together that no joint is held against.
+fn common(start: &Start) -> Motions {
+    let symmetric = &start.stepper.system.symmetric;
+    symmetric.sparing(&start.split.is_driven)
 }
 
 /// Velocities of a step relative to the drift.
@@ -79,6 +87,8 @@ impl Drifting {
 struct Parts {
     /// Velocity at the end, before the correction, relative to the drift.
     v: DVector<f64>,
+    /// B.
+    basis: Motions,
     /// Motion of all bodies together, user's coordinates.
     together: DVector<f64>,
     /// Bᵀ M B.
@@ -91,10 +101,10 @@ struct Parts {
     loads: DVector<f64>,
     /// g.
     contact: Option<DVector<f64>>,
-    /// Kinetic energy of the velocity before contact.
+    /// Kinetic energy of the velocity before contact, and of what contact takes of it.
     before: f64,
-    /// r and φ.
-    taken: f64,
+    lost: f64,
+    /// φ.
     fade: f64,
     defect: f64,
 }
@@ -111,7 +121,7 @@ impl Parts {
         let drifting = Drifting::new(start, velocities);
         let (before, after) = (&drifting.before, &drifting.after);
         let v = readout::solve(end, split, hat)? - s.system.drift.velocity();
-        let basis = &s.system.symmetric;
+        let basis = common(start);
         let (mut together, mut common, mut direction) =
             (DVector::zeros(v.len()), None, hat.clone());
         if !basis.is_empty() {
@@ -145,18 +155,14 @@ impl Parts {
             .contact_acts(&velocities.before)
             .then(|| near.contact_force(&velocities.after, Dual::User));
         let speed = e.mass_energy(before);
-        let mut taken = 0.0;
+        let mut lost = 0.0;
         if let Some(g) = &contact {
             defect -= 0.5 * s.dt * g.dot(&(before + after));
-            let lost = e.mass_energy(&(after - before));
-            taken = if lost > 0.0 {
-                lost / (FADE * speed)
-            } else {
-                0.0
-            };
+            lost = e.mass_energy(&(after - before)).max(0.0);
         }
         Ok(Some(Self {
             v,
+            basis,
             together,
             common,
             direction,
@@ -164,8 +170,11 @@ impl Parts {
             loads,
             contact,
             before: speed,
-            taken,
-            fade: 1.0 / (1.0 + taken),
+            lost,
+            fade: match lost > 0.0 {
+                true => FADE * speed / (FADE * speed + lost),
+                false => 1.0,
+            },
             defect,
         }))
     }
@@ -311,7 +320,7 @@ impl<'a> Closure<'a> {
             &mut at_end,
         )?;
         if let Some(common) = &parts.common {
-            let basis = &s.system.symmetric;
+            let basis = &parts.basis;
             let moved = end.frame_dual(&end.mass_times(&across));
             let eta = common.solve(&basis.tr_mul(&moved));
             let carried = basis.mul(&eta);
@@ -349,11 +358,12 @@ impl<'a> Closure<'a> {
             bar.add(-defect_bar, &work);
             out.velocities[0] -= defect_bar * half * g;
             out.velocities[1] -= defect_bar * (half * g + &work.v);
-            let taken_bar = -parts.fade * parts.fade * fade_bar;
-            if parts.taken > 0.0 {
+            if parts.lost > 0.0 {
                 let lost = after - before;
-                let lost_bar = taken_bar / (FADE * parts.before);
-                let before_bar = -parts.taken * taken_bar / parts.before;
+                // Of both energies; finite where nothing moved before.
+                let sum = FADE * parts.before + parts.lost;
+                let lost_bar = -FADE * parts.before / (sum * sum) * fade_bar;
+                let before_bar = FADE * parts.lost / (sum * sum) * fade_bar;
                 let moved = lost_bar * e.mass_times(&lost);
                 out.velocities[0] += before_bar * e.mass_times(before) - &moved;
                 out.velocities[1] += moved;

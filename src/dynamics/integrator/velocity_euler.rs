@@ -72,6 +72,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let mut before = along.v.clone();
         split.forget_driven_rows(&mut before);
         before += s.dt * self.factor.solve_columns(&right);
+        e.check()?;
         self.contact.velocity_jvp(start, along, &before)
     }
 

@@ -13,6 +13,8 @@ const INSIDE: f64 = 0.5;
 pub(crate) struct NearFaces {
     /// Of all of them, m².
     pub area: f64,
+    /// Their sum along their outward normals, world, m².
+    pub facing: Vec3,
     count: usize,
 }
 
@@ -60,6 +62,7 @@ impl Gaps {
                 .fold(f64::INFINITY, |least, (_, d)| least.min(*d));
             for (f, _) in faces.iter().filter(|(_, d)| *d <= nearest + beyond) {
                 near.area += tree.area(*f);
+                near.facing += poses[body].rotation * tree.area_vector(*f);
                 near.count += 1;
             }
         }

@@ -228,26 +228,24 @@ impl Observed {
         Ok(())
     }
 
-    fn miss(&self, at: &CostPoint, all: &[f64]) -> DVector<f64> {
+    fn miss(&self, at: &CostPoint, all: &[f64]) -> Result<DVector<f64>> {
+        let observable = observable::observable(&self.name)?;
         let goals = self.target.plain(at.sample().time);
-        let misses = self
-            .entries
-            .iter()
-            .zip(goals)
-            .map(|(e, goal)| all[*e] - goal);
-        DVector::from_iterator(self.entries.len(), misses)
+        let each = self.entries.iter().zip(goals);
+        let misses = each.map(|(e, goal)| observable.miss(all[*e], goal));
+        Ok(DVector::from_iterator(self.entries.len(), misses))
     }
 }
 
 impl Residual for Observed {
     fn value(&self, at: &CostPoint) -> Result<DVector<f64>> {
         let all = at.rollout.observable_value(&self.name, at.state)?;
-        Ok(self.miss(at, &all))
+        self.miss(at, &all)
     }
 
     fn jacobian(&self, at: &CostPoint) -> Result<(DVector<f64>, DMatrix<f64>)> {
         let (all, jacobian) = at.rollout.observable_jacobian(&self.name, at.state)?;
         let rows: Vec<_> = self.entries.iter().map(|e| jacobian.row(*e)).collect();
-        Ok((self.miss(at, &all), DMatrix::from_rows(&rows)))
+        Ok((self.miss(at, &all)?, DMatrix::from_rows(&rows)))
     }
 }

@@ -6,11 +6,7 @@ use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
-
-/// Observables that are angles: differences of theirs are taken the shorter way.
-const ANGLES: [&str; 2] = ["attitudes", "site_attitudes"];
 
 /// One entry of an observable as it was seen at some states of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -252,10 +248,7 @@ impl Experiment {
                     Entry::Occupied(held) => held.into_mut(),
                     Entry::Vacant(free) => free.insert(rollout.observable_value(name, *n)?),
                 };
-                let mut off = values[r.entry] - seen;
-                if ANGLES.contains(&name) {
-                    off -= TAU * (off / TAU).round();
-                }
+                let off = observable(name)?.miss(values[r.entry], *seen);
                 out.push(off / r.deviation);
             }
         }

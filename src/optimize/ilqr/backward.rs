@@ -46,6 +46,13 @@ pub(super) struct Backward {
     pub expected: [f64; 2],
 }
 
+impl Backward {
+    /// By how much a whole step is expected to lower the cost.
+    pub fn fall(&self) -> f64 {
+        -(self.expected[0] + self.expected[1])
+    }
+}
+
 /// V: what is still to come.
 struct Ahead {
     x: DVector<f64>,

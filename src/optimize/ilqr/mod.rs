@@ -152,7 +152,8 @@ pub(super) fn solve(
     watch.lap(&mut times.derivatives);
     let mut regularisation = settings.regularisation;
     let mut costs = vec![run.cost];
-    let (mut iterations, mut fresh) = (0, true);
+    // Steps that were refused since the last that wasn't.
+    let (mut iterations, mut fresh, mut refused) = (0, true, 0);
     let grow = |mu: f64| (mu * GROWTH).max(LEAST);
     let mut answers;
     let stop = loop {
@@ -174,10 +175,18 @@ pub(super) fn solve(
             break IlqrStop::Stuck;
         };
         answers = sweep.answers.clone();
-        let expected = -(sweep.expected[0] + sweep.expected[1]);
+        let expected = sweep.fall();
         let size = run.cost.abs();
-        if expected <= settings.tolerance.max(ROUNDING) * size {
-            break IlqrStop::Stationary;
+        let least = settings.tolerance.max(ROUNDING) * size;
+        if expected <= least {
+            // Heavy regularisation makes any step small: what there is to gain tells a sweep without.
+            let plain = backward(&model.knots, &model.last, 0.0);
+            if regularisation == 0.0 || plain.is_some_and(|plain| plain.fall() <= least) {
+                break IlqrStop::Stationary;
+            }
+            if refused > 0 {
+                break IlqrStop::Stuck;
+            }
         }
         if settings.target.is_some_and(|t| run.cost <= t) {
             break IlqrStop::Target;
@@ -192,7 +201,7 @@ pub(super) fn solve(
         let (part, fell) = match found {
             Some((part, next)) => {
                 let fell = run.cost - next.cost;
-                (run, fresh) = (next, false);
+                (run, fresh, refused) = (next, false, 0);
                 regularisation /= GROWTH;
                 if regularisation < LEAST {
                     regularisation = 0.0;
@@ -201,6 +210,7 @@ pub(super) fn solve(
             }
             None => {
                 regularisation = grow(regularisation);
+                refused += 1;
                 (0.0, f64::INFINITY)
             }
         };

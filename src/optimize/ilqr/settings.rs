@@ -93,7 +93,7 @@ pub enum IlqrStop {
     Cost,
     /// The cost reached [`IlqrSettings::target`].
     Target,
-    /// No step lowered the cost, with all regularisation that is allowed.
+    /// No step lowered the cost, with all regularisation that is allowed or as much as leaves no step worth a trial.
     Stuck,
     /// [`IlqrSettings::iterations`] are used up.
     Budget,

@@ -38,6 +38,10 @@ impl Observable for Attitudes {
         Ok(frames.flat_map(|(_, pose)| angles(&pose)).collect())
     }
 
+    fn is_angle(&self) -> bool {
+        true
+    }
+
     fn differentiable(&self) -> Option<&dyn Differentiable> {
         Some(self)
     }

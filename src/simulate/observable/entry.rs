@@ -8,6 +8,7 @@ use crate::geometry::Gap;
 use crate::multibody::Kinematics;
 use crate::scene::Scene;
 use nalgebra::DVector;
+use std::f64::consts::TAU;
 
 /// A quantity at every state of a rollout.
 pub trait Observable: Sync {
@@ -28,6 +29,20 @@ pub trait Observable: Sync {
     /// # Errors
     /// What it can't be found without fails.
     fn value(&self, at: &Reading) -> Result<Vec<f64>>;
+
+    /// Whether its entries are angles, the same after a whole turn.
+    fn is_angle(&self) -> bool {
+        false
+    }
+
+    /// By how much an entry misses what it is to be: angles by the shorter way round.
+    fn miss(&self, value: f64, goal: f64) -> f64 {
+        let off = value - goal;
+        match self.is_angle() {
+            true => off - TAU * (off / TAU).round(),
+            false => off,
+        }
+    }
 
     /// Its derivatives, where it has any.
     fn differentiable(&self) -> Option<&dyn Differentiable> {

@@ -225,7 +225,10 @@ fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
         let parts = made.parts();
         let size = parts.radius;
         let said = parts.fit.warnings.iter();
-        out.extend(said.map(|w| format!("{w} (lengths of this message in units of {size:.3e} m)")));
+        out.extend(said.map(|w| {
+            let name = &body.name;
+            format!("body {name:?}: {w} (lengths of this message in units of {size:.3e} m)")
+        }));
         let got = parts.fit.resolved_gap;
         let missed = parts.fit.scattered.max(parts.fit.radiated);
         if missed > MISSED {

@@ -3,8 +3,8 @@
 use super::vehicle;
 use crate::support::says;
 use hydrograd::optimize::{
-    Cost, CostPoint, CustomCost, Guess, IlqrSettings, Mpc, MpcSettings, Problem, Quadratic, Target,
-    Term, ilqr, terms,
+    Cost, CostPoint, CustomCost, Guess, IlqrProgress, IlqrSettings, IlqrStop, Mpc, MpcSettings,
+    Problem, Quadratic, Target, Term, ilqr, terms,
 };
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
 use hydrograd::{Error, Fidelity, Result, Settings, Simulator};
@@ -248,6 +248,47 @@ impl CustomCost for Wrong {
             0.0
         };
         Ok(out)
+    }
+}
+
+/// A cost whose gradient has the wrong sign.
+struct Uphill;
+
+impl CustomCost for Uphill {
+    fn value(&self, at: &CostPoint) -> Result<f64> {
+        Ok((at.sample().q[0] - 1.0).powi(2))
+    }
+
+    fn quadratic(&self, at: &CostPoint) -> Result<Quadratic> {
+        let mut out = Quadratic::zeros(16, at.control.map_or(8, |u| u.len()));
+        out.value = self.value(at)?;
+        out.x[0] = -2.0 * (at.sample().q[0] - 1.0);
+        out.xx[(0, 0)] = 2.0;
+        Ok(out)
+    }
+}
+
+/// Where no step lowers the cost that is what the plan says, and not that its gradient is zero.
+#[test]
+fn a_gradient_that_leads_uphill_ends_stuck() {
+    let sim = simulator();
+    let cost = Cost::default()
+        .running(terms::effort(1e-3))
+        .running(terms::custom(Uphill));
+    let start = sim.initial().unwrap();
+    for settings in [
+        IlqrSettings::default(),
+        IlqrSettings {
+            tolerance: 1e-3,
+            regularisation: 1e4,
+            ..IlqrSettings::default()
+        },
+    ] {
+        let problem = Problem::new(5, cost.clone());
+        let on = |_: &IlqrProgress| ControlFlow::Continue(());
+        let plan = ilqr(&sim, &start, &problem, Guess::Zero, &settings, on).unwrap();
+        assert_eq!(plan.stop, IlqrStop::Stuck, "{:?}", plan.costs);
+        assert!(plan.gradient > 1e-3);
     }
 }
 

@@ -314,10 +314,18 @@ pub fn compress(
             wrong_sign: chosen.wrong_sign,
             body_asymmetry: response.asymmetry(),
             body_error: response.error(),
-            warnings: response.warnings().to_vec(),
+            warnings: unnamed(name, response.warnings()),
         },
         points: chosen.points,
     })
+}
+
+/// Warnings of a body without its name: it may be kept for others that are made alike.
+fn unnamed(name: &str, warnings: &[String]) -> Vec<String> {
+    let prefix = format!("body \"{name}\": ");
+    let each = warnings.iter();
+    each.map(|w| w.strip_prefix(&prefix).unwrap_or(w).to_owned())
+        .collect()
 }
 
 /// The smallest gap (m) that a compressed body with the surface `area` (m²) can resolve.

@@ -288,7 +288,7 @@ fn a_gradient_that_leads_uphill_ends_stuck() {
         let on = |_: &IlqrProgress| ControlFlow::Continue(());
         let plan = ilqr(&sim, &start, &problem, Guess::Zero, &settings, on).unwrap();
         assert_eq!(plan.stop, IlqrStop::Stuck, "{:?}", plan.costs);
-        assert!(plan.gradient > 1e-3);
+        assert!(plan.gradient > 0.0);
     }
 }
 

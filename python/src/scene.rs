@@ -22,6 +22,11 @@ fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
     )
 }
 
+/// As it is now: other threads may go on with the scene while something is made of it.
+fn copied(scene: &Bound<'_, Scene>) -> PyResult<hydrograd::Scene> {
+    Ok(scene.try_borrow()?.0.clone())
+}
+
 /// What a simulation starts from: the fluid, walls, and bodies with their joints.
 ///
 /// `gravity` is in m/s², world axes; `time_step` (s) and `steps` are what a run takes unless told otherwise. Without a
@@ -255,19 +260,20 @@ impl Scene {
 
     /// The scene with other values of some of `shape_parameters`, or of coordinates of a mesh's vertices ("hull.vertex.17.x") that is given number by number. What would turn a
     /// body inside out is refused.
-    fn with_shape_parameters(&self, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let py = values.py();
+    fn with_shape_parameters(slf: &Bound<'_, Self>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let scene = copied(slf)?;
         let values = mapping::named("with_shape_parameters", "a number", Some(values))?;
-        light(py, || {
+        light(slf.py(), || {
             let values = values.iter().map(|(name, value)| (name.as_str(), *value));
-            self.0.with_shape_parameters(values)
+            scene.with_shape_parameters(values)
         })
         .map(Self)
     }
 
     /// Says what is wrong with the scene, if anything is.
-    fn validate(&self, py: Python<'_>) -> PyResult<()> {
-        light(py, || self.0.validate())
+    fn validate(slf: &Bound<'_, Self>) -> PyResult<()> {
+        let scene = copied(slf)?;
+        light(slf.py(), || scene.validate())
     }
 
     /// Number of the body with this name.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hydrograd._charts import Array, Charts, charts, cross
-from hydrograd._hydrograd import BatchError, Error, InputError, Record, Rollout, Simulator, State
+from hydrograd._hydrograd import BatchError, Error, InputError, Record, Rollout, Simulator, State, _nested
 
 Given = TypeVar("Given")
 Made = TypeVar("Made")
@@ -148,12 +148,18 @@ def each(work: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
     listed = list(given)
     if len(listed) < 2:
         return [work(one) for one in listed]
-    running = [_pool(os.getpid()).submit(work, one) for one in listed]
+    results: list[Callable[[], Made]]
+    if _nested():
+        # A controller of a batch that has batches of its own: the threads are taken by members that wait for it, so
+        # it does the work itself.
+        results = [functools.partial(work, one) for one in listed]
+    else:
+        results = [_pool(os.getpid()).submit(work, one).result for one in listed]
     members: list[Any] = []
     errors: dict[int, Error] = {}
-    for b, future in enumerate(running):
+    for b, result in enumerate(results):
         try:
-            members.append(future.result())
+            members.append(result())
         except BatchError as error:
             # A batch of one.
             errors[b] = error.errors[0]

@@ -530,7 +530,7 @@ class Scene:
     @property
     def shape_parameters(self) -> dict[str, float]:
         """The parameters of all bodies' shapes with their values, m (a mesh's scale: 1): "finger.size.y", "ball.radius" …"""
-    def with_shape_parameters(self, values: dict[str, float]) -> Scene:
+    def with_shape_parameters(self, values: Mapping[str, float]) -> Scene:
         """The scene with other values of some of `shape_parameters`, or of coordinates of a mesh's vertices ("hull.vertex.17.x") that is given number by number. What would turn a
         body inside out is refused."""
     def validate(self) -> None:
@@ -882,7 +882,9 @@ class SurfacePressure:
 
 @final
 class State:
-    """A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`."""
+    """A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`.
+
+    Other simulators of the same sizes take it as well, whatever their parameters, their integrator and their time step: `q`, `v` and the number of steps are kept."""
     @property
     def step(self) -> int:
         """Number of steps made."""
@@ -1268,11 +1270,11 @@ class Mpc:
         """The simulator that plans."""
     @property
     def replans(self) -> list[Replan]:
-        """All plans so far: a list of `Replan`."""
+        """All plans so far, those of a run under way among them: a list of `Replan`."""
     def set_model(self, model: Simulator) -> None:
-        """Plans with another simulator from now on: one that has learnt the current, say. It must have the sizes and the time step of the one before."""
+        """Plans with another simulator from now on: one that has learnt the current, say. It must have the sizes and the time step of the one before. Not during `run` or `control`."""
     def reset(self) -> None:
-        """Forgets plans, so that the next call starts anew."""
+        """Forgets plans, so that the next call starts anew. Not during `run` or `control`."""
     def control(self, time: float, q: ArrayLike, v: ArrayLike) -> _Array:
         """The controls, (control_size,), at a time, s, from where the plant is: `q` (q_size,), `v` (v_size,). Plans again when that is due. Times must not go back; the first one starts the clock."""
     def run(

@@ -145,6 +145,8 @@ pub fn or_zeros<const N: usize>(
 pub struct Rows {
     /// The rows.
     pub values: Vec<DVector<f64>>,
+    /// Numbers of a row: known where there is none as well.
+    pub size: usize,
     /// Whether they have an index of their own.
     pub is_many: bool,
 }
@@ -153,6 +155,7 @@ impl Rows {
     /// One.
     pub fn one(row: DVector<f64>) -> Self {
         Self {
+            size: row.len(),
             values: vec![row],
             is_many: false,
         }
@@ -177,7 +180,7 @@ impl Rows {
 
     /// As an array.
     pub fn to_python<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let n = self.values.first().map_or(0, DVector::len);
+        let n = self.size;
         let all = self.values.iter().flat_map(|row| row.as_slice().to_vec());
         match self.is_many {
             true => to_python(py, all.collect(), &[self.values.len(), n]),
@@ -197,6 +200,7 @@ pub fn rows(place: &str, given: &Bound<'_, PyAny>, n: usize) -> PyResult<Rows> {
     let values = (0..count).map(|i| DVector::from_column_slice(&found.values[i * n..(i + 1) * n]));
     Ok(Rows {
         values: values.collect(),
+        size: n,
         is_many,
     })
 }

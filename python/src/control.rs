@@ -3,7 +3,7 @@
 use crate::array::{self, Dim, array};
 use crate::cost::CostTerm;
 use crate::error::{OrRaise, input, internal};
-use crate::interrupt::{Progress, Told, followed, long};
+use crate::interrupt::{Interrupt, Progress, Told, followed, lock, long, short};
 use crate::optimize::class;
 use crate::rollout::Rollout;
 use crate::simulator::Simulator;
@@ -12,12 +12,14 @@ use hydrograd::optimize::{
     self, Cost, Guess, IlqrProgress, IlqrSettings, IlqrStop, MpcSettings, Plan, Problem, Replan,
 };
 use hydrograd::simulate::{Action, Observation, Policy};
+use hydrograd::{Error, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::time::Duration;
 
 type Numbers<'py> = Bound<'py, PyArrayDyn<f64>>;
 
@@ -190,8 +192,12 @@ fn iteration<'py>(py: Python<'py>, p: &IlqrProgress) -> PyResult<Bound<'py, PyAn
     class(py, "IlqrProgress")?.call1(parts)
 }
 
-fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
+/// The state that was given, or where the simulator starts.
+fn start(
+    given: Option<&Py<State>>,
+    simulator: &hydrograd::Simulator,
+) -> hydrograd::Result<dynamics::State> {
+    given.map_or_else(|| simulator.initial(), |state| state.get().of(simulator))
 }
 
 fn columns<'py>(py: Python<'py>, each: &[DVector<f64>]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
@@ -280,7 +286,7 @@ pub fn ilqr<'py>(
     let me = simulator.get();
     let problem = problem(cost, knots, hold, lower, upper, previous)?;
     let start = Start::of(guess, shift, me.controls_size())?;
-    let state = state.map(|state| state.get().state.clone());
+    let state = state.map(|state| state.clone().unbind());
     let settings = IlqrSettings {
         iterations,
         tolerance,
@@ -292,7 +298,7 @@ pub fn ilqr<'py>(
     let (told, raised) = Told::new(progress);
     let inner = me.inner.clone();
     let made = long(py, move |interrupt| {
-        let state = state.map_or_else(|| inner.initial(), Ok)?;
+        let state = self::start(state.as_ref(), &inner)?;
         optimize::ilqr(&inner, &state, &problem, start.guess(), &settings, |p| {
             told.tell(interrupt, |py| iteration(py, p))
         })
@@ -304,12 +310,78 @@ pub fn ilqr<'py>(
 /// before, moved on; the first one by `first_iterations`. Between plans the plan's `feedback` acts, or its controls alone. Other keywords are those of `ilqr`.
 ///
 /// The plant may be a robot, which asks for controls step by step (`control`), or a simulator (`run`): the model itself, or one of another fidelity, current, parameters or time step.
-#[pyclass(module = "hydrograd")]
+#[pyclass(frozen, module = "hydrograd")]
 pub struct Mpc {
-    inner: Arc<Mutex<optimize::Mpc>>,
+    planner: Arc<Planner>,
     problem: Problem,
-    model: Py<Simulator>,
+    model: Mutex<Py<Simulator>>,
 }
+
+/// What plans, for one piece of work at a time. Its mutexes are locked without the interpreter's lock, but for `replans`, which nobody holds for longer than a copy takes.
+struct Planner {
+    inner: Mutex<optimize::Mpc>,
+    /// The work that is at it, or was last.
+    work: Mutex<Interrupt>,
+    /// All plans so far: to be read while it plans.
+    replans: Mutex<Vec<Replan>>,
+}
+
+impl Planner {
+    /// Does work with the planner. Other work isn't waited for, for it may be what asks, by one of its callbacks; unless Ctrl-C has left it to itself: then it ends soon.
+    fn work<T>(
+        &self,
+        what: &str,
+        interrupt: &Interrupt,
+        work: impl FnOnce(&mut optimize::Mpc) -> hydrograd::Result<T>,
+    ) -> hydrograd::Result<T> {
+        let mut inner = self.enter(what, interrupt)?;
+        let made = work(&mut inner);
+        self.keep(inner.replans());
+        made
+    }
+
+    fn enter(
+        &self,
+        what: &str,
+        interrupt: &Interrupt,
+    ) -> hydrograd::Result<MutexGuard<'_, optimize::Mpc>> {
+        loop {
+            let free = match self.inner.try_lock() {
+                Ok(free) => Some(free),
+                Err(TryLockError::Poisoned(free)) => Some(free.into_inner()),
+                Err(TryLockError::WouldBlock) => None,
+            };
+            if let Some(free) = free {
+                *lock(&self.work) = interrupt.clone();
+                return Ok(free);
+            }
+            if !lock(&self.work).is_left() || rayon::current_thread_index().is_some() {
+                return Err(Error::Unsupported {
+                    what: format!("Mpc.{what} during run or control of the same Mpc"),
+                    why: "it plans for one at a time".into(),
+                    instead: "call it before or after, or make a second Mpc".into(),
+                });
+            }
+            if interrupt.is_left() {
+                return Err(Error::Stopped {
+                    what: format!("Mpc.{what}, before its turn"),
+                });
+            }
+            std::thread::sleep(TURN);
+        }
+    }
+
+    /// Keeps the plans for those who ask.
+    fn keep(&self, plans: &[Replan]) {
+        let mut kept = lock(&self.replans);
+        if kept.len() != plans.len() || kept.last() != plans.last() {
+            *kept = plans.to_vec();
+        }
+    }
+}
+
+/// How often it is looked whether work that was left to itself has ended.
+const TURN: Duration = Duration::from_millis(1);
 
 fn replanned<'py>(py: Python<'py>, each: &[Replan]) -> PyResult<Bound<'py, PyList>> {
     let class = class(py, "Replan")?;
@@ -329,7 +401,11 @@ fn replanned<'py>(py: Python<'py>, each: &[Replan]) -> PyResult<Bound<'py, PyLis
 #[pymethods]
 impl Mpc {
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.model)
+        // Nobody holds it for longer than a clone takes, with the interpreter's lock.
+        match self.model.try_lock() {
+            Ok(model) => visit.call(&*model),
+            Err(_) => Ok(()),
+        }
     }
 
     #[new]
@@ -365,38 +441,59 @@ impl Mpc {
                 ..base.ilqr
             },
         };
-        let inner = optimize::Mpc::new(&model.get().inner, &problem, settings).or_raise()?;
+        let theirs = &model.get().inner;
+        let inner = short(model.py(), || {
+            optimize::Mpc::new(theirs, &problem, settings)
+        })?;
+        let planner = Planner {
+            inner: Mutex::new(inner),
+            work: Mutex::default(),
+            replans: Mutex::default(),
+        };
         Ok(Self {
-            inner: Arc::new(Mutex::new(inner)),
+            planner: Arc::new(planner),
             problem,
-            model: model.clone().unbind(),
+            model: Mutex::new(model.clone().unbind()),
         })
     }
 
     /// The simulator that plans.
     #[getter]
     fn model(&self, py: Python<'_>) -> Py<Simulator> {
-        self.model.clone_ref(py)
+        lock(&self.model).clone_ref(py)
     }
 
-    /// Plans with another simulator from now on: one that has learnt the current, say. It must have the sizes and the time step of the one before.
-    fn set_model(&mut self, model: &Bound<'_, Simulator>) -> PyResult<()> {
-        lock(&self.inner)
-            .set_model(&model.get().inner, &self.problem)
-            .or_raise()?;
-        self.model = model.clone().unbind();
+    /// Plans with another simulator from now on: one that has learnt the current, say. It must have the sizes and the time step of the one before. Not during `run` or `control`.
+    fn set_model(&self, py: Python<'_>, model: &Bound<'_, Simulator>) -> PyResult<()> {
+        let (planner, problem) = (self.planner.clone(), self.problem.clone());
+        let theirs = model.get().inner.clone();
+        long(py, move |interrupt| {
+            planner.work("set_model", interrupt, |mpc| {
+                mpc.set_model(&theirs, &problem)
+            })
+        })?;
+        let before = std::mem::replace(&mut *lock(&self.model), model.clone().unbind());
+        // Its end may call Python: not while the mutex is held.
+        drop(before);
         Ok(())
     }
 
-    /// Forgets plans, so that the next call starts anew.
-    fn reset(&self) {
-        lock(&self.inner).reset();
+    /// Forgets plans, so that the next call starts anew. Not during `run` or `control`.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        let planner = self.planner.clone();
+        long(py, move |interrupt| {
+            planner.work("reset", interrupt, |mpc| {
+                mpc.reset();
+                Ok(())
+            })
+        })
     }
 
-    /// All plans so far: a list of `Replan`.
+    /// All plans so far, those of a run under way among them: a list of `Replan`.
     #[getter]
     fn replans<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        replanned(py, lock(&self.inner).replans())
+        let all = lock(&self.planner.replans).clone();
+        replanned(py, &all)
     }
 
     /// The controls, (control_size,), at a time, s, from where the plant is: `q` (q_size,), `v` (v_size,). Plans again when that is due. Times must not go back; the first one starts the clock.
@@ -407,16 +504,19 @@ impl Mpc {
         q: &Bound<'py, PyAny>,
         v: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let system = self.model.get().inner.system();
+        let model = self.model(py);
+        let system = model.get().inner.system();
         let sizes = [system.tree.coordinates(), system.tree.velocities()];
         let row = |name: &str, given: &Bound<'_, PyAny>, n: usize| -> PyResult<DVector<f64>> {
             let found = array(&format!("control: {name}"), given, &[Dim::Is(n)])?;
             Ok(found.values.into())
         };
         let (q, v) = (row("q", q, sizes[0])?, row("v", v, sizes[1])?);
-        let inner = self.inner.clone();
+        let planner = self.planner.clone();
         let made = long(py, move |interrupt| {
-            lock(&inner).control_with(time, &q, &v, &mut |_| interrupt.check())
+            planner.work("control", interrupt, |mpc| {
+                mpc.control_with(time, &q, &v, &mut |_| interrupt.check())
+            })
         })?;
         array::to_python(py, made.as_slice().to_vec(), &[made.len()])
     }
@@ -435,12 +535,17 @@ impl Mpc {
         let py = plant.py();
         let theirs = plant.get().inner.clone();
         let cost = cost.map_or_else(|| self.problem.cost.clone(), summed);
-        let state = state.map(|state| state.get().state.clone());
+        let state = state.map(|state| state.clone().unbind());
         let mut progress = Progress::new("run: progress", progress, steps)?;
-        let inner = self.inner.clone();
-        let made = followed(py, progress.as_mut(), move |interrupt| {
-            let state = state.map_or_else(|| theirs.initial(), Ok)?;
-            let made = lock(&inner).run(&theirs, &state, steps, &cost, |p| interrupt.at(p.step))?;
+        let planner = self.planner.clone();
+        let made = followed(py, &mut progress, move |interrupt| {
+            let state = start(state.as_ref(), &theirs)?;
+            let made = planner.work("run", interrupt, |mpc| {
+                mpc.run(&theirs, &state, steps, &cost, |p| {
+                    planner.keep(p.all);
+                    interrupt.at(p.step)
+                })
+            })?;
             let _ = interrupt.at(steps);
             Ok(made)
         });

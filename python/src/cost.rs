@@ -2,6 +2,7 @@
 
 use crate::array::{self, Dim, array};
 use crate::error::input;
+use crate::nested::ask;
 use hydrograd::optimize::{CostPoint, CustomCost, Quadratic, Target, Term, Weights, terms};
 use hydrograd::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -208,13 +209,13 @@ fn raised(error: PyErr) -> Error {
 
 impl CustomCost for Custom {
     fn value(&self, at: &CostPoint) -> Result<f64> {
-        Python::attach(|py| self.call(py, at)?[0].extract()).map_err(raised)
+        ask(|py| self.call(py, at)?[0].extract()).map_err(raised)
     }
 
     fn quadratic(&self, at: &CostPoint) -> Result<Quadratic> {
         let system = at.rollout.simulator().system();
         let (n, m) = (2 * system.tree.velocities(), system.controls);
-        Python::attach(|py| {
+        ask(|py| {
             let parts = self.call(py, at)?;
             let part = |k: usize, name: &str, shape: &[usize]| -> PyResult<Vec<f64>> {
                 match parts.get(k).filter(|part| !part.is_none()) {

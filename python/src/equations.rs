@@ -339,13 +339,15 @@ impl Equations {
     }
 }
 
-/// `xi` from or onto configurations, one or many.
+/// `xi` from or onto configurations, one or many: rows of `size` numbers.
 fn moved<'py>(
     py: Python<'py>,
     [first, second]: [&Rows; 2],
+    size: usize,
     map: impl Fn(&DVector<f64>, &DVector<f64>) -> hydrograd::Result<DVector<f64>>,
 ) -> PyResult<Array<'py>> {
-    let count = first.values.len().max(second.values.len());
+    // No rows are many as well.
+    let count = if first.is_many { first } else { second }.values.len();
     let both = first.is_many && second.is_many;
     if both && first.values.len() != second.values.len() {
         return Err(input(
@@ -357,7 +359,12 @@ fn moved<'py>(
     let made = (0..count).map(|i| map(first.row(i), second.row(i)));
     let values = made.collect::<hydrograd::Result<Vec<_>>>().or_raise()?;
     let is_many = first.is_many || second.is_many;
-    Rows { values, is_many }.to_python(py)
+    let made = Rows {
+        values,
+        size,
+        is_many,
+    };
+    made.to_python(py)
 }
 
 impl Simulator {
@@ -368,9 +375,12 @@ impl Simulator {
         xi: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let tree = &self.inner.system().tree;
-        let q = rows("integrate: q", q, tree.coordinates())?;
+        let size = tree.coordinates();
+        let q = rows("integrate: q", q, size)?;
         let given = rows("integrate: xi", xi, tree.velocities())?;
-        moved(xi.py(), [&q, &given], |q, xi| self.inner.integrate(q, xi))
+        moved(xi.py(), [&q, &given], size, |q, xi| {
+            self.inner.integrate(q, xi)
+        })
     }
 
     /// ξ from one configuration to another.
@@ -379,10 +389,11 @@ impl Simulator {
         from: &Bound<'py, PyAny>,
         to: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
-        let n = self.inner.system().tree.coordinates();
+        let tree = &self.inner.system().tree;
+        let (n, size) = (tree.coordinates(), tree.velocities());
         let first = rows("difference: start", from, n)?;
         let second = rows("difference: end", to, n)?;
-        moved(from.py(), [&first, &second], |a, b| {
+        moved(from.py(), [&first, &second], size, |a, b| {
             self.inner.difference(a, b)
         })
     }

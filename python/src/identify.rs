@@ -3,6 +3,8 @@
 use crate::array::{self, Dim, array};
 use crate::error::{OrRaise, counts, input};
 use crate::interrupt::{Told, long};
+use crate::mapping;
+use crate::nested::ask;
 use crate::optimize::class;
 use crate::simulator::Simulator;
 use hydrograd::optimize::{self, IdentifyProgress, IdentifySettings, Loss, Recorded};
@@ -11,7 +13,6 @@ use hydrograd::{Controls, Error};
 use nalgebra::{DMatrix, DVector};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A number to be found by `identify`: the parameter `name`, or several, `sets` = {parameter: factor}; `sets_start` = {coordinate: factor} sets coordinates of
@@ -29,18 +30,22 @@ impl Unknown {
     #[pyo3(signature = (name, *, sets=None, sets_start=None, start=None, prior=None, within=None, positive=false))]
     fn new(
         name: &str,
-        sets: Option<BTreeMap<String, f64>>,
-        sets_start: Option<BTreeMap<String, f64>>,
+        sets: Option<&Bound<'_, PyAny>>,
+        sets_start: Option<&Bound<'_, PyAny>>,
         start: Option<f64>,
         prior: Option<(f64, f64)>,
         within: Option<(f64, f64)>,
         positive: bool,
-    ) -> Self {
+    ) -> PyResult<Self> {
         let mut inner = optimize::Unknown::new(name);
-        for (parameter, factor) in sets.into_iter().flatten() {
+        let factors = |field: &str, given| {
+            let place = format!("unknown {name:?}: {field}");
+            mapping::named::<f64>(&place, "a number", given)
+        };
+        for (parameter, factor) in factors("sets", sets)? {
             inner = inner.sets(parameter, factor);
         }
-        for (coordinate, factor) in sets_start.into_iter().flatten() {
+        for (coordinate, factor) in factors("sets_start", sets_start)? {
             inner = inner.sets_start(coordinate, factor);
         }
         if let Some(start) = start {
@@ -55,7 +60,7 @@ impl Unknown {
         if positive {
             inner = inner.positive();
         }
-        Self { inner }
+        Ok(Self { inner })
     }
 
     /// The inertia of a body about its centre of mass, as six unknowns that make a physical one whatever they are: entries xx, yy, zz (by their logarithms), xy, xz, yz of the upper
@@ -172,7 +177,7 @@ impl Experiment {
         let function = function.clone().unbind();
         let names = observables.clone();
         let call = move |seen: &[DMatrix<f64>]| {
-            Python::attach(|py| -> PyResult<Vec<f64>> {
+            ask(|py| -> PyResult<Vec<f64>> {
                 let given = PyDict::new(py);
                 for ((name, shape), values) in names.iter().zip(&shapes).zip(seen) {
                     let dims = [&[values.ncols()], &shape[..]].concat();

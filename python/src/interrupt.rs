@@ -1,13 +1,18 @@
-//! Long work without the interpreter's lock, which Ctrl-C ends and a callback can follow.
+//! Work without the interpreter's lock; long work ends with Ctrl-C, and a callback can follow it.
+//!
+//! Whatever may ask the pool of threads for something stands in [`long`], [`followed`], [`short`] or [`light`]: a thread of the pool may be waiting for the interpreter's lock, to ask a controller
+//! written in Python, and who holds the lock and waits for the pool would wait for ever.
 
 use crate::error::{OrRaise, exception, input, internal};
+use crate::nested::{apart, ask};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::{self, ThreadId};
+use std::time::{Duration, Instant};
 
 /// How often signals are looked at, and progress is told.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -16,12 +21,20 @@ const PATIENCE: Duration = Duration::from_millis(50);
 #[derive(Clone, Default)]
 pub struct Interrupt {
     stop: Arc<AtomicBool>,
+    left: Arc<AtomicBool>,
     done: Arc<AtomicUsize>,
+    /// What follows work that the thread does which asked for it.
+    own: Option<Arc<Own>>,
 }
 
 impl Interrupt {
     /// For the progress of a rollout.
     pub fn check(&self) -> ControlFlow<()> {
+        if let Some(own) = &self.own
+            && !own.tell(self.done.load(Ordering::Relaxed))
+        {
+            self.stop.store(true, Ordering::Relaxed);
+        }
         match self.stop.load(Ordering::Relaxed) {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
@@ -38,6 +51,11 @@ impl Interrupt {
     pub fn one_more(&self) -> ControlFlow<()> {
         self.done.fetch_add(1, Ordering::Relaxed);
         self.check()
+    }
+
+    /// Whether Ctrl-C has left the work to itself: it has been asked to stop, and nobody waits for it.
+    pub fn is_left(&self) -> bool {
+        self.left.load(Ordering::Relaxed)
     }
 }
 
@@ -83,6 +101,46 @@ impl Progress {
     }
 }
 
+/// A callback that follows work of the thread that asked for it: nobody else is there to call it, so that thread does, between two parts of the work.
+struct Own {
+    thread: ThreadId,
+    /// With the time of its last call. Gone during a call, in which this thread may do other parts of the work.
+    progress: Mutex<Option<(Progress, Instant)>>,
+}
+
+impl Own {
+    fn new(progress: Progress) -> Self {
+        Self {
+            thread: thread::current().id(),
+            progress: Mutex::new(Some((progress, Instant::now()))),
+        }
+    }
+
+    /// Tells how far it is, if it is time to; whether to go on.
+    fn tell(&self, done: usize) -> bool {
+        if thread::current().id() != self.thread {
+            return true;
+        }
+        let due = |(_, last): &mut (Progress, Instant)| last.elapsed() >= PATIENCE;
+        let taken = lock(&self.progress).take_if(due);
+        let Some((mut progress, _)) = taken else {
+            return true;
+        };
+        let go_on = ask(|py| progress.tell(py, done));
+        *lock(&self.progress) = Some((progress, Instant::now()));
+        go_on
+    }
+
+    fn ended(&self) -> Option<Progress> {
+        lock(&self.progress).take().map(|(progress, _)| progress)
+    }
+}
+
+/// What a mutex guards, whatever became of those who held it.
+pub fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A callback of Python that is told of every iteration of a search, and ends it by giving True or by raising.
 pub struct Told {
     call: Option<Py<PyAny>>,
@@ -96,8 +154,8 @@ pub struct Raised(Arc<Mutex<Option<PyErr>>>);
 impl Raised {
     /// What was made, unless there was one.
     pub fn or<T>(&self, made: PyResult<T>) -> PyResult<T> {
-        let mut raised = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        raised.take().map_or(made, Err)
+        let raised = lock(&self.0).take();
+        raised.map_or(made, Err)
     }
 }
 
@@ -122,12 +180,12 @@ impl Told {
         let Some(call) = &self.call else {
             return ControlFlow::Continue(());
         };
-        let answer = Python::attach(|py| call.bind(py).call1((progress(py)?,))?.is_truthy());
+        let answer = ask(|py| call.bind(py).call1((progress(py)?,))?.is_truthy());
         match answer {
             Ok(false) => ControlFlow::Continue(()),
             Ok(true) => ControlFlow::Break(()),
             Err(error) => {
-                *self.raised.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                *lock(&self.raised.0) = Some(error);
                 ControlFlow::Break(())
             }
         }
@@ -173,28 +231,30 @@ pub fn long<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send + 'static,
 ) -> PyResult<T> {
-    followed(py, None, work)
+    followed(py, &mut None, work)
 }
 
 /// The same, with a callback that is told how far it is every so often, on this thread. After an exception of the callback the work is
 /// asked to stop and waited for: what it gives then comes back, and the exception stands in `progress`.
 pub fn followed<T: Send + 'static>(
     py: Python<'_>,
-    mut progress: Option<&mut Progress>,
+    progress: &mut Option<Progress>,
     work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send + 'static,
 ) -> PyResult<T> {
     not_forked()?;
-    let interrupt = Interrupt::default();
     // A controller that simulates is called by a thread that the simulation waits for: it can't wait for another.
     if rayon::current_thread_index().is_some() {
-        return finish(py, || work(&interrupt));
+        return followed_here(py, progress, work);
     }
+    let interrupt = Interrupt::default();
     let (send, receive) = sync_channel(1);
     let theirs = interrupt.clone();
     let thread = std::thread::Builder::new()
         .name("hydrograd".into())
         .spawn(move || {
-            let done = catch_unwind(AssertUnwindSafe(|| work(&theirs)));
+            let threads = rayon::current_num_threads();
+            let work = || apart(threads, || work(&theirs));
+            let done = catch_unwind(AssertUnwindSafe(work));
             // Nobody listens after an interrupt.
             let _ = send.send(done);
         });
@@ -209,7 +269,7 @@ pub fn followed<T: Send + 'static>(
         receive = back;
         match received {
             Ok(Ok(done)) => {
-                if let Some(progress) = &mut progress
+                if let Some(progress) = progress
                     && done.is_ok()
                 {
                     progress.tell(py, interrupt.done.load(Ordering::Relaxed));
@@ -219,10 +279,11 @@ pub fn followed<T: Send + 'static>(
             Ok(Err(panic)) => return Err(internal(said(panic.as_ref()))),
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(stop) = py.check_signals() {
+                    interrupt.left.store(true, Ordering::Relaxed);
                     interrupt.stop.store(true, Ordering::Relaxed);
                     return Err(stop);
                 }
-                if let Some(progress) = &mut progress
+                if let Some(progress) = progress
                     && !progress.tell(py, interrupt.done.load(Ordering::Relaxed))
                 {
                     interrupt.stop.store(true, Ordering::Relaxed);
@@ -233,7 +294,27 @@ pub fn followed<T: Send + 'static>(
     }
 }
 
-/// Does work that takes a step's time, on this thread.
+/// The same on this thread, which tells the callback between two parts of the work.
+fn followed_here<T: Send>(
+    py: Python<'_>,
+    progress: &mut Option<Progress>,
+    work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send,
+) -> PyResult<T> {
+    let interrupt = Interrupt {
+        own: progress.take().map(|progress| Arc::new(Own::new(progress))),
+        ..Interrupt::default()
+    };
+    let made = finish(py, || work(&interrupt));
+    *progress = interrupt.own.as_ref().and_then(|own| own.ended());
+    if let Some(progress) = progress
+        && made.is_ok()
+    {
+        progress.tell(py, interrupt.done.load(Ordering::Relaxed));
+    }
+    made
+}
+
+/// Does work that takes a step's time, on this thread: Ctrl-C waits for its end.
 pub fn short<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> hydrograd::Result<T> + Send,
@@ -242,11 +323,19 @@ pub fn short<T: Send>(
     finish(py, work)
 }
 
+/// The same for work that as a rule starts no threads: a forked process may do it, and a process may be forked after it.
+pub fn light<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> hydrograd::Result<T> + Send,
+) -> PyResult<T> {
+    finish(py, work)
+}
+
 fn finish<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> hydrograd::Result<T> + Send,
 ) -> PyResult<T> {
-    match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
+    match py.detach(|| catch_unwind(AssertUnwindSafe(|| apart(1, work)))) {
         Ok(done) => {
             py.check_signals()?;
             done.or_raise()

@@ -16,7 +16,9 @@ mod interrupt;
 mod joint;
 mod loads;
 mod log;
+mod mapping;
 mod mesh;
+mod nested;
 mod objective;
 mod optimize;
 mod output;
@@ -126,6 +128,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(_rollout, m)?)?;
     m.add_function(wrap_pyfunction!(tradeoff::tradeoff, m)?)?;
     m.add_function(wrap_pyfunction!(_command, m)?)?;
+    m.add_function(wrap_pyfunction!(nested::_nested, m)?)?;
     m.add_function(wrap_pyfunction!(robot::inspect_robot, m)?)?;
     control::register(m)?;
     identify::register(m)?;

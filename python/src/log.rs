@@ -1,5 +1,6 @@
 //! What happens, told to Python's `logging` under the name "hydrograd": before and after work, never within it.
 
+use crate::interrupt::short;
 use pyo3::prelude::*;
 use std::time::Instant;
 
@@ -51,7 +52,7 @@ pub fn warnings(
     let Some(logger) = listened(py, Level::Warning)? else {
         return Ok(());
     };
-    for warning in py.detach(find) {
+    for warning in short(py, || Ok(find()))? {
         tell(&logger, Level::Warning, format!("{of}: {warning}"))?;
     }
     Ok(())

@@ -3,6 +3,7 @@
 use crate::array::{self, Dim, array};
 use crate::error::{input, own};
 use crate::interrupt::{Interrupt, long};
+use crate::nested::ask;
 use crate::rollout::Rollout;
 use crate::scene::Scene;
 use crate::simulator::Simulator;
@@ -44,7 +45,7 @@ impl Function {
         if raised().is_some() || self.interrupt.check().is_break() {
             return Err(stopped());
         }
-        Python::attach(|py| {
+        ask(|py| {
             let error = match self.value(py, stage, x) {
                 Ok(found) => return Ok(found),
                 Err(error) => error,

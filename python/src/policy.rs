@@ -2,6 +2,7 @@
 
 use crate::array::{self, Dim};
 use crate::error::{exception, input};
+use crate::nested::ask;
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use nalgebra::DVector;
 use pyo3::prelude::*;
@@ -123,8 +124,8 @@ impl Controller {
 }
 
 /// What Python gives, or the exception that it raises as the reason for which it doesn't.
-fn ask<T>(call: impl FnOnce(Python<'_>) -> PyResult<T>) -> hydrograd::Result<T> {
-    Python::attach(call).map_err(|raised| hydrograd::Error::Controller {
+fn asked<T>(call: impl FnOnce(Python<'_>) -> PyResult<T>) -> hydrograd::Result<T> {
+    ask(call).map_err(|raised| hydrograd::Error::Controller {
         source: Box::new(raised),
     })
 }
@@ -132,7 +133,7 @@ fn ask<T>(call: impl FnOnce(Python<'_>) -> PyResult<T>) -> hydrograd::Result<T> 
 impl Policy for Controller {
     fn act(&self, observed: &Observation) -> hydrograd::Result<Action> {
         Ok(Action {
-            control: ask(|py| self.try_act(py, observed))?,
+            control: asked(|py| self.try_act(py, observed))?,
             ..Action::default()
         })
     }
@@ -142,7 +143,7 @@ impl Policy for Controller {
         observed: &Observation,
         control_bar: &DVector<f64>,
     ) -> hydrograd::Result<ActionBar> {
-        ask(|py| self.try_act_vjp(py, observed, control_bar))
+        asked(|py| self.try_act_vjp(py, observed, control_bar))
     }
 
     fn gains(&self) -> Vec<f64> {

@@ -1,9 +1,10 @@
 //! How simulators are made and made again, and where their runs begin.
 
-use crate::error::{OrRaise, input};
-use crate::interrupt::long;
+use crate::error::input;
+use crate::interrupt::{light, long};
 use crate::log;
 use crate::simulator::Simulator;
+use crate::state::State;
 use hydrograd::dynamics;
 use hydrograd::simulate::Choices;
 use nalgebra::DVector;
@@ -67,7 +68,7 @@ pub fn rebuild(
     start: (Vec<f64>, Vec<f64>, Vec<f64>),
     softness: f64,
 ) -> PyResult<Simulator> {
-    let scene = hydrograd::Scene::from_toml(toml, "").or_raise()?;
+    let scene = light(py, || hydrograd::Scene::from_toml(toml, ""))?;
     let choices = serde_json::from_str(choices).map_err(|e| {
         input(
             "pickled simulator: choices",
@@ -96,14 +97,13 @@ pub fn set_gains(simulator: &mut hydrograd::Simulator, gains: &[f64]) -> hydrogr
 }
 
 /// Where a run begins.
-#[derive(Clone)]
 pub enum Start {
     /// Where the simulator says.
     Scene,
     /// At coordinates and a velocity.
     From(DVector<f64>, DVector<f64>),
     /// At a state.
-    At(dynamics::State),
+    At(Py<State>),
 }
 
 impl Start {
@@ -112,7 +112,7 @@ impl Start {
         match self {
             Self::Scene => simulator.initial(),
             Self::From(q, v) => simulator.state(0, q, v),
-            Self::At(state) => Ok(state.clone()),
+            Self::At(state) => state.get().of(simulator),
         }
     }
 }

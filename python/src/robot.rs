@@ -1,8 +1,10 @@
 //! Robots in URDF files.
 
 use crate::body::Drag;
-use crate::error::{OrRaise, input};
+use crate::error::input;
+use crate::interrupt::light;
 use crate::joint::Motion;
+use crate::mapping;
 use hydrograd::Fluid;
 use hydrograd::scene::{Added, RobotReport};
 use pyo3::prelude::*;
@@ -30,8 +32,9 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
                 continue;
             }
             if key.eq("motions")? {
-                let given: BTreeMap<String, Bound<'_, PyAny>> = value.extract()?;
+                let given = mapping::named("robot: motions", "a Motion, or several", Some(&value))?;
                 for (joint, each) in given {
+                    let each: Bound<'_, PyAny> = each;
                     let each: Vec<PyRef<'_, Motion>> = match each.extract::<PyRef<'_, Motion>>() {
                         Ok(one) => vec![one],
                         Err(_) => each.extract()?,
@@ -46,8 +49,8 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
             }
         }
     }
-    // Arrays as lists, paths as text.
-    let code = c"lambda x: x.tolist() if hasattr(x, 'tolist') else str(x)";
+    // Arrays as lists, mappings as dictionaries, paths as text.
+    let code = c"lambda x: x.tolist() if hasattr(x, 'tolist') else dict(x) if hasattr(x, 'keys') else str(x)";
     let options = PyDict::new(py);
     options.set_item("default", py.eval(code, None, None)?)?;
     let json = py
@@ -121,8 +124,7 @@ pub fn scene_of(
     given: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<hydrograd::Scene> {
     let robot = choices(py, given)?;
-    py.detach(|| hydrograd::Scene::from_urdf(path, &robot))
-        .or_raise()
+    light(py, || hydrograd::Scene::from_urdf(path, &robot))
 }
 
 /// `Scene.add_robot`.
@@ -133,7 +135,7 @@ pub fn add(
     given: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Robot> {
     let robot = choices(py, given)?;
-    let added = py.detach(|| scene.add_robot(path, &robot)).or_raise()?;
+    let added = light(py, || scene.add_robot(path, &robot))?;
     Ok(Robot::new(scene, added))
 }
 
@@ -152,6 +154,6 @@ pub fn inspect_robot<'py>(
         density,
         ..Fluid::fresh_water()
     };
-    let report = py.detach(|| robot.inspect(path, &fluid)).or_raise()?;
+    let report = light(py, || robot.inspect(path, &fluid))?;
     to_dict(py, &report)
 }

@@ -5,8 +5,9 @@ use crate::contact;
 use crate::error::{OrRaise, in_order, input};
 use crate::flow;
 use crate::gradient;
-use crate::interrupt::{Progress, ended, followed, long, short};
+use crate::interrupt::{Progress, ended, followed, light, long, short};
 use crate::loads::Loads;
+use crate::mapping;
 use crate::objective::Objective;
 use crate::output;
 use crate::pressure::SurfacePressure;
@@ -22,7 +23,6 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -138,7 +138,8 @@ impl Rollout {
     /// Velocities of the bodies, (N + 1, bodies, 6), world axes: of the origin, m/s, and angular, rad/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> Numbers<'py> {
-        array::transposed(py, &self.inner.velocities(), &[self.bodies(), 6])
+        let made = light(py, || Ok(self.inner.velocities()))?;
+        array::transposed(py, &made, &[self.bodies(), 6])
     }
 
     /// Kinetic energy of bodies and fluid, (N + 1,), J.
@@ -173,8 +174,8 @@ impl Rollout {
 
     /// What should be known about this trajectory, with names and numbers.
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.inner.warnings()
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        short(py, || Ok(self.inner.warnings()))
     }
 
     /// The water across the smallest gap of the trajectory, beside that of coupled panels: a dictionary with `time` (s), `gap` (m), `bodies` (names; of
@@ -434,7 +435,7 @@ impl Rollout {
         let objective = objective.0.clone();
         let rollout = self.inner.clone();
         let mut progress = Progress::new("gradient: progress", progress, self.steps())?;
-        let made = followed(py, progress.as_mut(), move |interrupt| {
+        let made = followed(py, &mut progress, move |interrupt| {
             objective.check(&rollout)?;
             rollout.vjp_with(&objective.cotangents(&rollout), |done| interrupt.at(done))
         });
@@ -456,7 +457,7 @@ impl Rollout {
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
         controls: Option<&Bound<'py, PyAny>>,
-        observables: Option<&Bound<'py, PyDict>>,
+        observables: Option<&Bound<'py, PyAny>>,
         density: f64,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -492,8 +493,8 @@ impl Rollout {
                 *part = array::array(place, given, &shape)?.columns(part.nrows());
             }
         }
-        for (name, given) in observables.into_iter().flatten() {
-            let name: String = name.extract()?;
+        let observables = mapping::named("vjp: observables", "an array", observables)?;
+        for (name, given) in observables {
             let place = format!("vjp: observables[{name:?}]");
             let system = self.inner.simulator().system();
             let found = observable::observable(&name).or_raise()?;
@@ -512,7 +513,7 @@ impl Rollout {
         }
         let rollout = self.inner.clone();
         let mut progress = Progress::new("vjp: progress", progress, self.steps())?;
-        let made = followed(py, progress.as_mut(), move |interrupt| {
+        let made = followed(py, &mut progress, move |interrupt| {
             rollout.vjp_with(&seed, |done| interrupt.at(done))
         });
         let made = ended(progress, made)?;
@@ -530,7 +531,7 @@ impl Rollout {
         controls: Option<&Bound<'py, PyAny>>,
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
-        parameters: Option<&Bound<'py, PyDict>>,
+        parameters: Option<&Bound<'py, PyAny>>,
         gains: Option<&Bound<'py, PyAny>>,
         observables: Option<Vec<String>>,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -586,12 +587,14 @@ impl Rollout {
     /// ("ball.pressure_0", …, Pa), at the price of solves of its own a state; `pandas.DataFrame(rollout.to_dict())` is a table.
     #[pyo3(signature = (*, pressure=false))]
     fn to_dict<'py>(&self, py: Python<'py>, pressure: bool) -> PyResult<Bound<'py, PyDict>> {
-        let mut recording = Recording::of(&self.simulator.get().scene, &self.inner).or_raise()?;
-        if pressure {
-            let inner = self.inner.clone();
-            let pressed = long(py, move |_| inner.pressures())?;
-            recording.observables.push(pressed);
-        }
+        let (simulator, inner) = (self.simulator.clone_ref(py), self.inner.clone());
+        let recording = long(py, move |_| {
+            let mut recording = Recording::of(&simulator.get().scene, &inner)?;
+            if pressure {
+                recording.observables.push(inner.pressures()?);
+            }
+            Ok(recording)
+        })?;
         let out = PyDict::new(py);
         let n = recording.time.len();
         let column = |values: Vec<f64>| array::to_python(py, values, &[n]);
@@ -636,17 +639,18 @@ impl Rollout {
         path: PathBuf,
         frames_per_second: Option<f64>,
         every: Option<isize>,
-        colors: Option<BTreeMap<String, String>>,
+        colors: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PathBuf> {
         let frames = (frames_per_second, every);
-        output::write_gltf(py, &self.inner, path, frames, colors.unwrap_or_default())
+        let colors = mapping::named("write_gltf: colors", "a text, \"#rrggbb\"", colors)?;
+        output::write_gltf(py, &self.inner, path, frames, colors)
     }
 
     /// Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water
     /// across gaps is carried and how far off it is estimated to be (`gaps`), the largest gap
     /// at which surfaces are taken to touch (m), steps that were cut into pieces, and the most pieces of one.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let s = self.inner.summary();
+        let s = short(py, || Ok(self.inner.summary()))?;
         let out = PyDict::new(py);
         out.set_item("steps", s.steps)?;
         out.set_item("energy_initial", s.energy_initial)?;

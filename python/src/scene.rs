@@ -4,12 +4,13 @@ use crate::array::{fixed, or_zeros, row};
 use crate::body::Body;
 use crate::error::{OrRaise, input};
 use crate::fluid::{Contact, Fluid};
+use crate::interrupt::light;
 use crate::joint::Motion;
+use crate::mapping;
 use crate::robot::{self, Robot};
 use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A force whose keys or values don't fit.
@@ -19,6 +20,11 @@ fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
         format!("{kind:?}: {why}"),
         "must be a kind of force with the keys that it has in a scene file",
     )
+}
+
+/// As it is now: other threads may go on with the scene while something is made of it.
+fn copied(scene: &Bound<'_, Scene>) -> PyResult<hydrograd::Scene> {
+    Ok(scene.try_borrow()?.0.clone())
 }
 
 /// What a simulation starts from: the fluid, walls, and bodies with their joints.
@@ -56,17 +62,16 @@ impl Scene {
 
     /// Reads a scene file (TOML); paths of meshes are relative to it.
     #[staticmethod]
-    fn load(path: PathBuf) -> PyResult<Self> {
-        hydrograd::Scene::load(path).or_raise().map(Self)
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        light(py, || hydrograd::Scene::load(path)).map(Self)
     }
 
     /// A scene from TOML text; paths of meshes are relative to `folder`.
     #[staticmethod]
     #[pyo3(signature = (text, folder=None))]
-    fn from_toml(text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
-        hydrograd::Scene::from_toml(text, folder.unwrap_or_default())
-            .or_raise()
-            .map(Self)
+    fn from_toml(py: Python<'_>, text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
+        let folder = folder.unwrap_or_default();
+        light(py, || hydrograd::Scene::from_toml(text, folder)).map(Self)
     }
 
     /// A scene of the robot in a URDF or MJCF file, in still fresh water, gravity along -z. Choices are those of `add_robot`.
@@ -176,12 +181,10 @@ impl Scene {
             }
         }
         given.set_item("kind", kind)?;
-        // Arrays as lists.
+        // Arrays as lists, mappings as dictionaries.
+        let code = c"lambda x: dict(x) if hasattr(x, 'keys') else x.tolist()";
         let options = PyDict::new(py);
-        let list = py
-            .import("operator")?
-            .call_method1("methodcaller", ("tolist",))?;
-        options.set_item("default", list)?;
+        options.set_item("default", py.eval(code, None, None)?)?;
         let json = py
             .import("json")?
             .call_method("dumps", (given,), Some(&options));
@@ -257,15 +260,20 @@ impl Scene {
 
     /// The scene with other values of some of `shape_parameters`, or of coordinates of a mesh's vertices ("hull.vertex.17.x") that is given number by number. What would turn a
     /// body inside out is refused.
-    fn with_shape_parameters(&self, values: BTreeMap<String, f64>) -> PyResult<Self> {
-        let values = values.iter().map(|(name, value)| (name.as_str(), *value));
-        let out = self.0.with_shape_parameters(values).or_raise()?;
-        Ok(Self(out))
+    fn with_shape_parameters(slf: &Bound<'_, Self>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let scene = copied(slf)?;
+        let values = mapping::named("with_shape_parameters", "a number", Some(values))?;
+        light(slf.py(), || {
+            let values = values.iter().map(|(name, value)| (name.as_str(), *value));
+            scene.with_shape_parameters(values)
+        })
+        .map(Self)
     }
 
     /// Says what is wrong with the scene, if anything is.
-    fn validate(&self) -> PyResult<()> {
-        self.0.validate().or_raise()
+    fn validate(slf: &Bound<'_, Self>) -> PyResult<()> {
+        let scene = copied(slf)?;
+        light(slf.py(), || scene.validate())
     }
 
     /// Number of the body with this name.
@@ -337,7 +345,7 @@ impl Scene {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        let text = slf.borrow().to_toml()?;
+        let text = slf.try_borrow()?.to_toml()?;
         Ok((slf.get_type().getattr("from_toml")?, (text,)))
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::array::{self, Dim};
 use crate::error::{OrRaise, input};
+use crate::interrupt::short;
 use crate::mesh::{Triangles, triangles};
 use hydrograd::{MassProperties, TriMesh, shape};
 use nalgebra::Vector3;
@@ -24,13 +25,13 @@ impl Shape {
 
     /// Its triangles: vertices (n, 3) in m and faces (m, 3), vertex numbers counted from 0.
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Triangles<'py>> {
-        triangles(py, &self.mesh()?)
+        triangles(py, &self.mesh(py)?)
     }
 
     /// Volume of the triangles, m³.
     #[getter]
-    fn volume(&self) -> PyResult<f64> {
-        Ok(MassProperties::of(&self.mesh()?).volume)
+    fn volume(&self, py: Python<'_>) -> PyResult<f64> {
+        Ok(MassProperties::of(&self.mesh(py)?).volume)
     }
 
     fn __repr__(&self) -> String {
@@ -39,8 +40,8 @@ impl Shape {
 }
 
 impl Shape {
-    fn mesh(&self) -> PyResult<TriMesh> {
-        shape::build(&self.0, Path::new(""), None).or_raise()
+    fn mesh(&self, py: Python<'_>) -> PyResult<TriMesh> {
+        short(py, || shape::build(&self.0, Path::new(""), None))
     }
 
     fn checked(shape: hydrograd::Shape) -> PyResult<Self> {
@@ -120,7 +121,7 @@ fn mesh(
             let path: PathBuf = vertices.extract()?;
             let shape = Shape::checked(hydrograd::Shape::Mesh { path, scale })?;
             // What is wrong with the file is said here, not when a simulator is made.
-            shape.mesh()?;
+            shape.mesh(vertices.py())?;
             return Ok(shape);
         }
         if vertices.hasattr("vertices")? && vertices.hasattr("faces")? {
@@ -144,7 +145,7 @@ fn from_arrays(
     if !(scale.is_finite() && scale > 0.0) {
         return Err(input("mesh: scale", scale, "must be finite and positive"));
     }
-    let of = [Dim::Any("n"), Dim::Is(3)];
+    let (py, of) = (vertices.py(), [Dim::Any("n"), Dim::Is(3)]);
     let vertices = array::array("mesh: vertices", vertices, &of)?;
     let faces = array::array("mesh: faces", faces, &of)?;
     let count = vertices.shape[0];
@@ -170,8 +171,10 @@ fn from_arrays(
     let vertices = vertices.values.as_chunks().0.iter();
     let vertices: Vec<[f64; 3]> = vertices.map(|v: &[f64; 3]| v.map(|x| x * scale)).collect();
     // What is wrong with the mesh is said here, not when a simulator is made.
-    let points = vertices.iter().map(|v| Vector3::from(*v)).collect();
-    TriMesh::new("of triangles", points, faces.clone()).or_raise()?;
+    short(py, || {
+        let points = vertices.iter().map(|v| Vector3::from(*v)).collect();
+        TriMesh::new("of triangles", points, faces.clone())
+    })?;
     Ok(Shape(hydrograd::Shape::triangles(vertices, faces)))
 }
 

@@ -7,6 +7,7 @@ use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::{self, by_name};
 use crate::interrupt::{Progress, ended, followed, long, short};
 use crate::log;
+use crate::mapping;
 use crate::mesh::{Triangles, triangles};
 use crate::objective::Objective;
 use crate::policy::Controller;
@@ -67,7 +68,7 @@ impl Simulator {
                     "give one or the other",
                 ));
             }
-            return Ok(Start::At(state.get().state.clone()));
+            return Ok(Start::At(state.clone().unbind()));
         }
         let (q0, v0) = self.inner.start();
         Ok(match (q, v) {
@@ -220,7 +221,7 @@ impl Simulator {
         let mut progress = Progress::new("rollout: progress", progress, steps)?;
         let inner = me.inner.clone();
         let started = Instant::now();
-        let made = followed(py, progress.as_mut(), move |interrupt| {
+        let made = followed(py, &mut progress, move |interrupt| {
             let controls = Controls::from_matrix(&inner, matrix)?;
             let state = start.state(&inner)?;
             Ok(inner.rollout_as_far(&state, &controls, |done| interrupt.at(done)))
@@ -275,8 +276,8 @@ impl Simulator {
                 (0..batch).map(|b| &found.values[b * default.len()..(b + 1) * default.len()]);
             PyResult::Ok(rows.map(DVector::from_column_slice).collect())
         };
-        let starts = match (q, v) {
-            (None, None) => vec![Start::Scene; batch],
+        let starts: Vec<Start> = match (q, v) {
+            (None, None) => (0..batch).map(|_| Start::Scene).collect(),
             _ => {
                 let q = each("rollout_batch: q", q, q0)?;
                 let v = each("rollout_batch: v", v, v0)?;
@@ -299,13 +300,13 @@ impl Simulator {
         let py = slf.py();
         let mut progress = Progress::new("rollout_batch: progress", progress, batch * steps)?;
         let started = Instant::now();
-        let made = followed(py, progress.as_mut(), move |interrupt| {
+        let made = followed(py, &mut progress, move |interrupt| {
             let member = |(start, matrix): (Start, DMatrix<f64>)| {
                 let controls = Controls::from_matrix(&inner, matrix)?;
                 let begin = match start {
                     Start::Scene => Begin::Scene,
                     Start::From(q, v) => Begin::At(q, v),
-                    Start::At(state) => Begin::State(state),
+                    Start::At(state) => Begin::State(state.get().of(&inner)?),
                 };
                 hydrograd::Result::Ok(Member { begin, controls })
             };
@@ -373,7 +374,7 @@ impl Simulator {
         let steps = all.iter().map(|rollout| rollout.steps()).sum();
         let (inner, objective) = (self.inner.clone(), objective.0.clone());
         let mut progress = Progress::new("gradient_batch: progress", progress, steps)?;
-        let made = followed(py, progress.as_mut(), move |interrupt| {
+        let made = followed(py, &mut progress, move |interrupt| {
             let all: Vec<&hydrograd::Rollout> = all.iter().map(Arc::as_ref).collect();
             let bars = all.iter().map(|rollout| {
                 objective.check(rollout)?;
@@ -414,7 +415,7 @@ impl Simulator {
         let kept = Checkpoints::within(&inner, matrix.ncols(), memory);
         let total = kept.work(matrix.ncols());
         let mut progress = Progress::new("gradient_in_parts: progress", progress, total)?;
-        let made = followed(py, progress.as_mut(), move |interrupt| {
+        let made = followed(py, &mut progress, move |interrupt| {
             let controls = Controls::from_matrix(&inner, matrix)?;
             inner.gradient_in_parts(&controls, &objective, kept, |done| interrupt.at(done))
         });
@@ -469,8 +470,8 @@ impl Simulator {
             Some(u) => array("step: u", u, &[Dim::Is(n)])?.values.into(),
             None => DVector::zeros(n),
         };
-        let from = &state.get().state;
-        let (state, record) = short(slf.py(), || me.inner.step(from, &control))?;
+        let from = state.get();
+        let (state, record) = short(slf.py(), || me.inner.step(&from.of(&me.inner)?, &control))?;
         let next = State {
             simulator: slf.clone().unbind(),
             state,
@@ -553,7 +554,8 @@ impl Simulator {
 
     /// The same with other physical parameters, by name as in `parameters`; what isn't named stays. It shares what was
     /// prepared, so it costs next to nothing.
-    fn with_parameters(&self, changes: HashMap<String, f64>) -> PyResult<Self> {
+    fn with_parameters(&self, changes: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let changes = mapping::named("with_parameters", "a number", Some(changes))?;
         self.changed(|inner| {
             let mut parameters = inner.parameters().clone();
             for (name, value) in &changes {
@@ -793,8 +795,8 @@ impl Simulator {
 
     /// What should be known about the scene and its start, with names and numbers.
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        warnings(&self.inner)
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        short(py, || Ok(warnings(&self.inner)))
     }
 
     fn __repr__(&self) -> String {

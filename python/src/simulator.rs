@@ -1,6 +1,6 @@
 //! Simulators: the class; its methods stand in `simulation.rs`.
 
-use crate::error::OrRaise;
+use crate::interrupt::short;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -32,16 +32,21 @@ impl Simulator {
     /// A clone with something changed.
     pub fn changed(
         &self,
-        change: impl FnOnce(&mut hydrograd::Simulator) -> hydrograd::Result<()>,
+        change: impl FnOnce(&mut hydrograd::Simulator) -> hydrograd::Result<()> + Send,
     ) -> PyResult<Self> {
-        let mut inner = hydrograd::Simulator::clone(&self.inner);
-        change(&mut inner).or_raise()?;
-        Ok(Self {
-            inner: Arc::new(inner),
-            scene: self.scene.clone(),
-            cache: self.cache.clone(),
-            policy: Python::attach(|py| self.policy.as_ref().map(|p| p.clone_ref(py))),
-            softness: self.softness,
+        Python::attach(|py| {
+            let inner = short(py, || {
+                let mut inner = hydrograd::Simulator::clone(&self.inner);
+                change(&mut inner)?;
+                Ok(inner)
+            })?;
+            Ok(Self {
+                inner: Arc::new(inner),
+                scene: self.scene.clone(),
+                cache: self.cache.clone(),
+                policy: self.policy.as_ref().map(|p| p.clone_ref(py)),
+                softness: self.softness,
+            })
         })
     }
 

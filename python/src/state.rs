@@ -10,10 +10,12 @@ use nalgebra::{DMatrix, DVector};
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyTuple;
 use std::sync::Arc;
 
 /// A state between two steps: made by `Simulator.state`, `Simulator.step` or `Rollout.state`.
+///
+/// Other simulators of the same sizes take it as well, whatever their parameters, their integrator and their time step: `q`, `v` and the number of steps are kept.
 #[pyclass(frozen, module = "hydrograd")]
 pub struct State {
     /// The simulator that it belongs to.
@@ -45,6 +47,29 @@ impl State {
             .poses
     }
 
+    /// The same state for a simulator, which may be another: to the bit where both have the same scene, choices and parameters. Elsewhere what an integrator steps in (for
+    /// most momentum) is another for the same motion: there it is made anew of coordinates and velocity.
+    ///
+    /// # Errors
+    /// What `simulator` refuses of them.
+    pub fn of(&self, simulator: &hydrograd::Simulator) -> hydrograd::Result<dynamics::State> {
+        let (own, state) = (&*self.simulator.get().inner, &self.state);
+        let tree = &simulator.system().tree;
+        let fits = [state.q.len(), self.velocity.len()] == [tree.coordinates(), tree.velocities()];
+        // Of other sizes it is refused where it is used.
+        if !fits || is_alike(own, simulator) {
+            return Ok(state.clone());
+        }
+        let made = simulator.state(state.step, &state.q, &self.velocity)?;
+        let held = state.held.clone();
+        let held = (held.len() == simulator.system().len()).then_some(held);
+        Ok(dynamics::State {
+            held: held.unwrap_or_default(),
+            mode: state.mode,
+            ..made
+        })
+    }
+
     /// From its parts, as `__reduce__` gives them.
     pub fn from_parts((simulator, step, q, y, held, mode, v): Parts) -> Self {
         Self {
@@ -59,6 +84,14 @@ impl State {
             velocity: v.into(),
         }
     }
+}
+
+/// Whether the numbers of states mean the same to both.
+fn is_alike(a: &hydrograd::Simulator, b: &hydrograd::Simulator) -> bool {
+    // Clones share their scene: big meshes aren't gone through then.
+    let scenes = || std::ptr::eq(a.scene(), b.scene()) || a.scene() == b.scene();
+    std::ptr::eq(a, b)
+        || (a.choices() == b.choices() && a.parameters() == b.parameters() && scenes())
 }
 
 #[pymethods]
@@ -221,7 +254,7 @@ impl Record {
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
         u: Option<&Bound<'py, PyAny>>,
-        parameters: Option<&Bound<'py, PyDict>>,
+        parameters: Option<&Bound<'py, PyAny>>,
         gains: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let along = Along {

@@ -3,6 +3,7 @@
 use crate::array::{self, Array, Dim};
 use crate::error::{OrRaise, input};
 use crate::interrupt::{long, short};
+use crate::mapping;
 use hydrograd::simulate::{Displacement, Jacobians, Record, Tangents, Variables, observable};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
@@ -15,7 +16,7 @@ pub struct Along<'a, 'py> {
     pub controls: Option<&'a Bound<'py, PyAny>>,
     pub q: Option<&'a Bound<'py, PyAny>>,
     pub v: Option<&'a Bound<'py, PyAny>>,
-    pub parameters: Option<&'a Bound<'py, PyDict>>,
+    pub parameters: Option<&'a Bound<'py, PyAny>>,
     pub gains: Option<&'a Bound<'py, PyAny>>,
 }
 
@@ -103,8 +104,9 @@ fn displacements(
         }
     }
     let mut named: Vec<(String, Part)> = Vec::new();
-    for (name, given) in along.parameters.into_iter().flatten() {
-        let name: String = name.extract()?;
+    let parameters = mapping::named("jvp: parameters", "an array", along.parameters)?;
+    for (name, given) in parameters {
+        let given: Bound<'_, PyAny> = given;
         zero.parameters.place(&name).or_raise()?;
         let part = Part::new(&format!("jvp: parameters[{name:?}]"), &given, &[])?;
         named.push((name, part));

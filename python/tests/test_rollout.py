@@ -1,5 +1,7 @@
 """What a rollout shows: shapes, units, names."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -157,3 +159,68 @@ def test_meshes_from_arrays_objects_and_files(tmp_path):
         matrices.append(hg.added_mass(scene))
     # A file's vertices may be numbered in another order.
     assert np.allclose(*matrices, rtol=1e-9, atol=1e-12)
+
+
+def test_a_state_of_another_simulator_keeps_its_velocity(sim, controls):
+    """Whatever integrators step in: most of them in momentum, which is another where the masses are."""
+
+    def made(dt=0.01, **settings):
+        return hg.Simulator(sim.scene, dt, fidelity="isolated", **settings)
+
+    momentum, velocity = made(integrator="momentum-euler"), made(integrator="velocity-euler")
+    heavier = momentum.with_parameters({"ball.mass": 3 * momentum.parameters["ball.mass"]})
+    simulators = [momentum, velocity, heavier, made(dt=0.005), made(integrator="midpoint")]
+    goal = [hg.cost.effort(1.0)]
+    for first in simulators:
+        state = first.rollout(controls[:3]).state()
+        assert np.abs(state.v).max() > 1e-3
+        for second in simulators:
+            right = second.state(state.q, state.v, step=3)
+            run = second.rollout(controls[3:5], state=state)
+            assert np.allclose(run.v[0], state.v, rtol=1e-9, atol=1e-12) and np.array_equal(run.q[0], state.q)
+            assert np.isclose(run.time[0], 3 * second.dt)
+            assert np.allclose(run.q[-1], second.rollout(controls[3:5], state=right).q[-1], rtol=1e-9, atol=1e-12)
+            after, right_after = second.step(state, controls[3])[0], second.step(right, controls[3])[0]
+            assert np.allclose(after.v, right_after.v, rtol=1e-9, atol=1e-12) and after.step == 4
+            plan = hg.optimize.ilqr(second, goal, knots=2, state=state, iterations=1)
+            assert np.allclose(plan.rollout.v[0], state.v, rtol=1e-9, atol=1e-12)
+            followed = hg.optimize.Mpc(second, goal, knots=2).run(second, 2, state=state)
+            assert np.allclose(followed.rollout.v[0], state.v, rtol=1e-9, atol=1e-12)
+
+
+def test_a_state_of_the_same_simulator_made_again_goes_on_to_the_bit(sim, controls):
+    state = sim.rollout(controls[:4]).state()
+    right = sim.rollout(controls[4:], state=state).q
+    others = [pickle.loads(pickle.dumps(sim)), sim.with_start(v=sim.initial_v + 0.1), sim.with_policy(Nothing())]
+    for other in others:
+        assert np.array_equal(other.rollout(controls[4:], state=state).q, right)
+    assert np.array_equal(sim.rollout(controls[4:], state=pickle.loads(pickle.dumps(state))).q, right)
+
+
+class Nothing:
+    """A controller that does nothing."""
+
+    def act(self, seen):
+        return np.zeros(6)
+
+
+def test_a_state_of_other_sizes_is_refused(sim):
+    scene = hg.Scene()
+    scene.add(hg.Body(hg.sphere(0.05), density=1000.0, actuated=True))
+    other = hg.Simulator(scene, 0.01, fidelity="isolated")
+    for use in (other.rollout, other.step):
+        with pytest.raises(hg.InputError, match="as the scene's"):
+            use(state=sim.state())
+
+
+def test_no_configurations_have_no_tangents(sim):
+    none, some = np.zeros((0, sim.q_size)), np.zeros((0, sim.v_size))
+    for q, xi in ((none, some), (none, np.zeros(sim.v_size)), (sim.initial_q, some)):
+        assert sim.integrate(q, xi).shape == (0, sim.q_size)
+    for start, end in ((none, none), (none, sim.initial_q), (sim.initial_q, none)):
+        assert sim.difference(start, end).shape == (0, sim.v_size)
+    with pytest.raises(hg.InputError, match="0 and 2 rows"):
+        sim.integrate(none, np.zeros((2, sim.v_size)))
+    equations = sim.equations(none)
+    assert equations.q.shape == none.shape and equations.mass_matrix().shape == (0, sim.v_size, sim.v_size)
+    assert sim.linearise(none)[0].shape == (0, 2 * sim.v_size, 2 * sim.v_size)

@@ -10,8 +10,6 @@ mod hull;
 mod inertia;
 mod joints;
 mod mjcf;
-mod mjcf_geometry;
-mod mjcf_left_out;
 mod options;
 mod overlap;
 mod paths;

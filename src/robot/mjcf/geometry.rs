@@ -1,13 +1,13 @@
 //! Geometry of an MJCF file: shapes, and the mass that follows from them where a body gives none.
 
-use super::inertia::Inertial;
-use super::pieces::Loaded;
+use super::super::inertia::Inertial;
+use super::super::pieces::Loaded;
 use crate::geometry::MassProperties;
 use crate::shape::Shape;
 use crate::{Error, Result};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Geom, GeomType};
-use nalgebra::{Isometry3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -138,17 +138,22 @@ fn placed(geom: &Geom, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
     let Some([ax, ay, az, bx, by, bz]) = geom.fromto else {
         return (*pose, geom.size);
     };
-    // The pose is that of frames around it. Axes point from the second end to the first.
-    let [a, b] = [[ax, ay, az], [bx, by, bz]].map(|x| (pose * Point3::from(x)).coords);
-    let along = a - b;
-    let turn = Rotation3::rotation_between(&Vector3::z(), &along)
-        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI));
-    let turn = UnitQuaternion::from_rotation_matrix(&turn);
-    let at = Isometry3::from_parts(Translation3::from(0.5 * (a + b)), turn);
+    // The pose is that of frames around it.
+    let at = pose * between([ax, ay, az], [bx, by, bz]);
+    let along = Vector3::new(ax - bx, ay - by, az - bz);
     let (radius, half) = (geom.size[0], 0.5 * along.norm());
     let sizes = match geom.type_ {
         GeomType::Box | GeomType::Ellipsoid => [radius, radius, half],
         _ => [radius, half, 0.0],
     };
     (at, sizes)
+}
+
+/// The frame in the middle of two points whose z axis points from the second one to the first.
+pub(super) fn between(a: [f64; 3], b: [f64; 3]) -> Isometry3<f64> {
+    let [a, b] = [a, b].map(Vector3::from);
+    let turn = Rotation3::rotation_between(&Vector3::z(), &(a - b))
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI));
+    let turn = UnitQuaternion::from_rotation_matrix(&turn);
+    Isometry3::from_parts(Translation3::from(0.5 * (a + b)), turn)
 }

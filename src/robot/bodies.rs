@@ -83,6 +83,7 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     }
     check_names(&file, options)?;
     let groups = groups(&file, options)?;
+    check_choices(&file, &groups, options)?;
     let mut all = Vec::with_capacity(groups.len());
     for group in &groups {
         let motion = match group.joint {
@@ -93,11 +94,16 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     }
     if options.followers == Followers::Follow {
         let joints: Vec<_> = groups.iter().map(|g| g.joint).collect();
-        follow(&file, &joints, &mut all, &mut report)?;
+        follow(&file, &joints, options, &mut all, &mut report)?;
     }
     let mut own = Vec::with_capacity(file.robot.links.len());
-    for link in 0..file.robot.links.len() {
-        let (inertial, mended) = of_link(&file, link)?;
+    let mut tops = vec![0; file.robot.links.len()];
+    for group in &groups {
+        group.parts.iter().for_each(|p| tops[p.link] = group.top());
+    }
+    for (link, top) in tops.into_iter().enumerate() {
+        let chosen = options.links.get(&file.robot.links[top].name);
+        let (inertial, mended) = of_link(&file, link, top, chosen)?;
         own.push(chosen_mass(&file, link, inertial, options)?);
         if let Some(mended) = mended {
             report.note(mended);
@@ -129,8 +135,8 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
         wets.push(bodies.dry_if_massless(g, wet, &mut report));
     }
     untangle(&mut wets, &names, &parents, &poses, &mut report)?;
-    for wet in &mut wets {
-        wet.finish(options);
+    for (wet, name) in wets.iter_mut().zip(&names) {
+        wet.finish(name, options, &mut report);
     }
     let overlaps = declare(&mut wets, &names, &parents, &poses, &mut report)?;
     bodies.tell_overlaps(&overlaps, &names, &mut report);
@@ -179,6 +185,58 @@ fn check_names(file: &File, options: &Options) -> Result<()> {
                 format!("{bad:?}"),
                 format!("the file has no such name there; it has {known:?}"),
             ));
+        }
+    }
+    Ok(())
+}
+
+/// What is chosen must have an effect: starts of joints that have a coordinate of their own, and of bodies what is a body.
+fn check_choices(file: &File, groups: &[Group], options: &Options) -> Result<()> {
+    for (number, joint) in file.robot.joints.iter().enumerate() {
+        let Some(start) = options.start.get(&joint.name) else {
+            continue;
+        };
+        let follows = (joint.mimic.as_ref()).filter(|_| options.followers == Followers::Follow);
+        let remedy = match follows {
+            _ if joint.joint_type == JointType::Fixed => {
+                "the joint is fixed, and has no coordinate: leave its start out".to_string()
+            }
+            Some(mimic) => format!(
+                "the joint follows {:?}: give the start of that one, or make it `mimic = \"independent\"`",
+                mimic.joint
+            ),
+            None if options.driven.contains(&joint.name) => {
+                "the joint is driven, and starts where its motion does: leave its start or its motion out".into()
+            }
+            None => continue,
+        };
+        let place = format!("{}: start", joint_place(file, number));
+        return Err(Error::input(place, start, remedy));
+    }
+    let choice = |link: usize| options.links.get(&file.robot.links[link].name);
+    for group in groups {
+        let body = &file.robot.links[group.top()].name;
+        let is_dense = choice(group.top()).is_some_and(|c| c.density.is_some());
+        for (k, part) in group.parts.iter().enumerate() {
+            let Some(choice) = choice(part.link) else {
+                continue;
+            };
+            let wrong = |key: &str, remedy: String| {
+                let place = format!("{}: {key}, as chosen", link_place(file, part.link));
+                Err(Error::input(place, "of no effect", remedy))
+            };
+            if let Some(key) = choice.of_body.first().filter(|_| k > 0) {
+                let remedy = format!(
+                    "the link is part of body {body:?}: choose it for that one, or make the link a body of its own by `keep = true`"
+                );
+                return wrong(key, remedy);
+            }
+            if choice.mass.is_some() && is_dense {
+                let remedy = format!(
+                    "the mass of body {body:?} follows from the `density` chosen for it: leave one of the two out"
+                );
+                return wrong("mass", remedy);
+            }
         }
     }
     Ok(())
@@ -260,6 +318,11 @@ impl Bodies<'_> {
         self.options.links.get(self.name(g))?.density
     }
 
+    fn has_inertia_chosen(&self, g: usize) -> bool {
+        let choice = self.options.links.get(self.name(g));
+        choice.is_some_and(|choice| choice.has("inertia"))
+    }
+
     /// Whether a joint moves it that it alone doesn't give any inertia to.
     fn is_massless(&self, g: usize) -> bool {
         self.joint(g).velocities() > 0 && self.inertials[g].is_none() && self.density(g).is_none()
@@ -338,7 +401,8 @@ impl Bodies<'_> {
     /// Whether it has mass, and no inertia about an axis that its joint turns it about, nor anything on it.
     fn is_point(&self, g: usize) -> bool {
         let own = &self.inertials[g];
-        if own.mass == 0.0 || own.inertia.norm() > 0.0 || self.density(g).is_some() {
+        let chosen = self.density(g).is_some() || self.has_inertia_chosen(g);
+        if own.mass == 0.0 || own.inertia.norm() > 0.0 || chosen {
             return false;
         }
         if self.groups.iter().any(|other| other.parent == Some(g)) {
@@ -485,11 +549,8 @@ impl Bodies<'_> {
     /// What of a body's inertia fits nothing of its size.
     fn implausible(&self, g: usize, wet: &Wet, seen: &MassProperties) -> Result<Option<String>> {
         let own = &self.inertials[g];
-        let Some(surface) = wet
-            .surface
-            .as_ref()
-            .filter(|_| own.mass > 0.0 && self.density(g).is_none())
-        else {
+        let chosen = self.density(g).is_some() || self.has_inertia_chosen(g);
+        let Some(surface) = (wet.surface.as_ref()).filter(|_| own.mass > 0.0 && !chosen) else {
             return Ok(None);
         };
         let mesh = surface.mesh()?;

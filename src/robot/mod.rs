@@ -4,6 +4,7 @@
 //! What a scene makes of it is in `scene::robot`.
 
 mod bodies;
+mod even;
 mod file;
 mod followers;
 mod hull;
@@ -14,6 +15,7 @@ mod options;
 mod overlap;
 mod paths;
 mod pieces;
+mod points;
 mod read;
 mod report;
 mod surface;

@@ -4,6 +4,7 @@
 //! What a scene makes of it is in `scene::robot`.
 
 mod bodies;
+mod chosen;
 mod even;
 mod file;
 mod followers;

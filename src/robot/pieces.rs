@@ -93,8 +93,9 @@ impl Loaded {
     }
 
     /// Its convex hull as the water sees it; none if it has no volume.
-    fn fine(&self) -> Option<&TriMesh> {
-        self.fine.get_or_init(|| self.made(fine_hull)).as_ref()
+    pub fn fine(&self) -> Option<&TriMesh> {
+        let fine = self.fine.get_or_init(|| self.made(fine_hull)).as_ref();
+        fine.or_else(|| self.hull())
     }
 
     fn made(&self, hull: impl Fn(&str, &[Vec3]) -> Result<TriMesh>) -> Option<TriMesh> {
@@ -114,7 +115,7 @@ impl Piece {
     pub fn points(&self) -> Result<Vec<Vec3>> {
         let own = match &self.form {
             Form::Primitive(shape) => points(shape)?,
-            Form::Mesh(loaded) => match loaded.fine().or(loaded.hull()) {
+            Form::Mesh(loaded) => match loaded.fine() {
                 Some(hull) => hull.vertices().to_vec(),
                 None => Vec::new(),
             },

@@ -858,9 +858,7 @@ fn choices_stand_for_what_can_not_be() {
 fn choices_without_effect_are_refused() {
     let limit =
         "<axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/>";
-    let mimic = format!(
-        "<axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"0.5\" effort=\"1\" velocity=\"1\"/><mimic joint=\"lead\"/>"
-    );
+    let mimic = "<axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"0.5\" effort=\"1\" velocity=\"1\"/><mimic joint=\"lead\"/>";
     let text = robot(
         &[
             link("a", ""),
@@ -868,7 +866,7 @@ fn choices_without_effect_are_refused() {
             link("c", ""),
             link("d", &collision("<sphere radius=\"0.1\"/>", "")),
             joint("lead", "revolute", "a", "b", limit),
-            joint("led", "revolute", "a", "c", &mimic),
+            joint("led", "revolute", "a", "c", mimic),
             joint("still", "fixed", "a", "d", ""),
         ]
         .concat(),

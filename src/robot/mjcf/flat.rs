@@ -34,12 +34,17 @@ pub(super) fn flat(file: &Element) -> Result<Element> {
     }
     for section in file.all("equality") {
         for one in &section.children {
-            let one = classes.resolved(one, "equality", None)?;
-            equality.children.push(match &one.tag[..] {
-                "joint" => own(&one, "coupling"),
-                // Of others it is told that they are there.
-                _ => Element::at(&one.tag, &one),
-            });
+            match &one.tag[..] {
+                "joint" => {
+                    let one = classes.resolved(one, "equality", None)?;
+                    equality.children.push(own(&one, "coupling"));
+                }
+                // Of these it is told that they are there.
+                tag @ ("connect" | "weld" | "tendon") => {
+                    equality.children.push(Element::at(tag, one));
+                }
+                _ => {}
+            }
         }
     }
     made.children = vec![compiler, asset, world, equality];

@@ -25,6 +25,9 @@ pub(super) enum Solid {
     Mesh(PathBuf, [f64; 3]),
 }
 
+/// A solid, and where it is in the body's frame.
+pub(super) type Placed = (Solid, Isometry3<f64>);
+
 /// The geometry of one body.
 pub(super) struct Geometries<'m> {
     path: &'m Path,
@@ -47,11 +50,7 @@ impl<'m> Geometries<'m> {
     }
 
     /// A geom that its frame puts at `pose`, and where it is in the body's frame; none of planes, height fields and distance fields.
-    pub fn read(
-        &self,
-        geom: &Geom,
-        pose: &Isometry3<f64>,
-    ) -> Result<Option<(Solid, Isometry3<f64>)>> {
+    pub fn read(&self, geom: &Geom, pose: &Isometry3<f64>) -> Result<Option<Placed>> {
         let (at, [x, y, z]) = placed(geom, pose);
         let shape = match geom.type_ {
             GeomType::Sphere => Shape::sphere(x),
@@ -92,7 +91,7 @@ impl<'m> Geometries<'m> {
     pub fn inertial(
         &self,
         geom: &Geom,
-        (solid, at): &(Solid, Isometry3<f64>),
+        (solid, at): &Placed,
         density: f64,
     ) -> Result<Option<Inertial>> {
         let found = match solid {
@@ -102,7 +101,7 @@ impl<'m> Geometries<'m> {
             Solid::Mesh(file, scale) => {
                 let loaded = Loaded::new(file.clone(), *scale, &self.place())?;
                 let closed = loaded.mesh.clone().into_mesh().ok();
-                let whole = closed.or_else(|| loaded.hull().cloned());
+                let whole = closed.or_else(|| loaded.fine().cloned());
                 whole.map(|mesh| mesh.mass_properties())
             }
         };

@@ -3,7 +3,7 @@
 use super::super::report::Unused;
 use super::attributes::{check, read, unread};
 use super::classes::KINDS;
-use super::element::Element;
+use super::element::{Element, TURNS};
 use crate::Result;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -196,18 +196,22 @@ impl<'p> LeftOut<'p> {
     fn inertial(&mut self, element: &Element, of: &str, second: bool) -> Result<()> {
         self.leaf(element, "inertial", of)?;
         let has = |name: &str| element.get(name).is_some();
-        let turned = super::element::TURNS.iter().any(|name| has(name));
-        let wrong = match () {
-            () if second => "is one too many in a body; leave one",
-            () if !has("mass") => "needs the attribute mass",
-            () if has("fullinertia") && has("diaginertia") => {
-                "fullinertia and diaginertia both tell its inertia; leave one"
-            }
-            () if has("fullinertia") && turned => {
-                "fullinertia is in the body's axes, and nothing turns it; leave the orientation out, or give diaginertia"
-            }
-            () => return Ok(()),
-        };
-        Err(element.wrong_of(of, wrong))
+        let turned = TURNS.iter().any(|name| has(name));
+        let wrong = [
+            (second, "is one too many in a body; leave one"),
+            (!has("mass"), "needs the attribute mass"),
+            (
+                has("fullinertia") && has("diaginertia"),
+                "fullinertia and diaginertia both tell its inertia; leave one",
+            ),
+            (
+                has("fullinertia") && turned,
+                "fullinertia is in the body's axes, and nothing turns it; leave the orientation out, or give diaginertia",
+            ),
+        ];
+        match wrong.into_iter().find(|(is_so, _)| *is_so) {
+            Some((_, what)) => Err(element.wrong_of(of, what)),
+            None => Ok(()),
+        }
     }
 }

@@ -26,7 +26,7 @@ fn off(found: usize, asked: usize) -> f64 {
 /// The same surface with about so many faces and its volume; the nearest that there is where none near that number keeps the shape.
 pub(super) fn even(mesh: &TriMesh, faces: usize, convex: bool) -> TriMesh {
     let volume = mesh.mass_properties().volume;
-    // What few faces cut off a round body, at its volume's side of what it is scaled by.
+    // N faces between points of a ball cut off 11/N of its volume, which scaling gives back.
     let most = 0.02 + 12.0 / faces as f64;
     let kept = |m: &TriMesh| (m.mass_properties().volume / volume - 1.0).abs() < most;
     let good = |m: &TriMesh| kept(m) && is_near(m.faces().len(), faces);

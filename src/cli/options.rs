@@ -114,7 +114,7 @@ pub(super) struct RobotArguments {
     /// What the water sees of links [default: collision].
     #[arg(long, value_parser = choice::<Wet>())]
     wet: Option<Wet>,
-    /// What is done about joints that follow others [default: refuse].
+    /// What is done about joints that follow others [default: follow].
     #[arg(long, value_parser = choice::<Followers>())]
     mimic: Option<Followers>,
     /// What is done about meshes that aren't closed or cross themselves [default: hull].

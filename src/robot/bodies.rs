@@ -1,5 +1,6 @@
 //! From a file to bodies.
 
+use super::chosen::{check_choices, check_names, chosen_mass};
 use super::file::File;
 use super::followers::follow;
 use super::inertia::{Inertial, of_group, of_link};
@@ -18,7 +19,6 @@ use crate::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use nalgebra::Isometry3;
 use std::path::Path;
-use urdf_rs::JointType;
 
 /// A moment of inertia, in that of a point mass at the edge of what the link is, under which it is implausible.
 const THIN: f64 = 1e-4;
@@ -83,6 +83,7 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     }
     check_names(&file, options)?;
     let groups = groups(&file, options)?;
+    check_choices(&file, &groups, options)?;
     let mut all = Vec::with_capacity(groups.len());
     for group in &groups {
         let motion = match group.joint {
@@ -93,11 +94,16 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     }
     if options.followers == Followers::Follow {
         let joints: Vec<_> = groups.iter().map(|g| g.joint).collect();
-        follow(&file, &joints, &mut all, &mut report)?;
+        follow(&file, &joints, options, &mut all, &mut report)?;
     }
     let mut own = Vec::with_capacity(file.robot.links.len());
-    for link in 0..file.robot.links.len() {
-        let (inertial, mended) = of_link(&file, link)?;
+    let mut tops = vec![0; file.robot.links.len()];
+    for group in &groups {
+        group.parts.iter().for_each(|p| tops[p.link] = group.top());
+    }
+    for (link, top) in tops.into_iter().enumerate() {
+        let chosen = options.links.get(&file.robot.links[top].name);
+        let (inertial, mended) = of_link(&file, link, top, chosen)?;
         own.push(chosen_mass(&file, link, inertial, options)?);
         if let Some(mended) = mended {
             report.note(mended);
@@ -129,8 +135,8 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
         wets.push(bodies.dry_if_massless(g, wet, &mut report));
     }
     untangle(&mut wets, &names, &parents, &poses, &mut report)?;
-    for wet in &mut wets {
-        wet.finish(options);
+    for (wet, name) in wets.iter_mut().zip(&names) {
+        wet.finish(name, options, &mut report);
     }
     let overlaps = declare(&mut wets, &names, &parents, &poses, &mut report)?;
     bodies.tell_overlaps(&overlaps, &names, &mut report);
@@ -157,56 +163,6 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
         bodies: made,
         folded,
         report,
-    })
-}
-
-/// Choices by name must be of links and joints that are there.
-fn check_names(file: &File, options: &Options) -> Result<()> {
-    let links: Vec<&str> = file.robot.links.iter().map(|l| l.name.as_str()).collect();
-    let joints: Vec<&str> = file.robot.joints.iter().map(|j| j.name.as_str()).collect();
-    let moving = (file.robot.joints.iter()).filter(|j| j.joint_type != JointType::Fixed);
-    let moving: Vec<&str> = moving.map(|j| j.name.as_str()).collect();
-    let all = [
-        ("links", &links, options.links.keys().collect::<Vec<_>>()),
-        ("start", &joints, options.start.keys().collect()),
-        ("motions", &moving, options.driven.iter().collect()),
-        ("zeros", &moving, options.zeroed.iter().collect()),
-    ];
-    for (key, known, given) in all {
-        if let Some(bad) = given.iter().find(|name| !known.contains(&name.as_str())) {
-            return Err(Error::input(
-                format!("{}: {key}", file.path.display()),
-                format!("{bad:?}"),
-                format!("the file has no such name there; it has {known:?}"),
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// A link's own inertia with the mass that is chosen for it: the inertia grows with it.
-fn chosen_mass(
-    file: &File,
-    link: usize,
-    inertial: Inertial,
-    options: &Options,
-) -> Result<Inertial> {
-    let name = &file.robot.links[link].name;
-    let Some(mass) = options.links.get(name).and_then(|choice| choice.mass) else {
-        return Ok(inertial);
-    };
-    if !(mass >= 0.0 && mass.is_finite()) {
-        let place = format!("{}: mass, as chosen", link_place(file, link));
-        return Err(Error::input(place, mass, "give zero or more, in kg"));
-    }
-    let factor = match inertial.mass > 0.0 {
-        true => mass / inertial.mass,
-        false => 1.0,
-    };
-    Ok(Inertial {
-        mass,
-        inertia: inertial.inertia * factor,
-        ..inertial
     })
 }
 
@@ -258,6 +214,11 @@ impl Bodies<'_> {
 
     fn density(&self, g: usize) -> Option<f64> {
         self.options.links.get(self.name(g))?.density
+    }
+
+    fn has_inertia_chosen(&self, g: usize) -> bool {
+        let choice = self.options.links.get(self.name(g));
+        choice.is_some_and(|choice| choice.has("inertia"))
     }
 
     /// Whether a joint moves it that it alone doesn't give any inertia to.
@@ -338,7 +299,8 @@ impl Bodies<'_> {
     /// Whether it has mass, and no inertia about an axis that its joint turns it about, nor anything on it.
     fn is_point(&self, g: usize) -> bool {
         let own = &self.inertials[g];
-        if own.mass == 0.0 || own.inertia.norm() > 0.0 || self.density(g).is_some() {
+        let chosen = self.density(g).is_some() || self.has_inertia_chosen(g);
+        if own.mass == 0.0 || own.inertia.norm() > 0.0 || chosen {
             return false;
         }
         if self.groups.iter().any(|other| other.parent == Some(g)) {
@@ -485,11 +447,8 @@ impl Bodies<'_> {
     /// What of a body's inertia fits nothing of its size.
     fn implausible(&self, g: usize, wet: &Wet, seen: &MassProperties) -> Result<Option<String>> {
         let own = &self.inertials[g];
-        let Some(surface) = wet
-            .surface
-            .as_ref()
-            .filter(|_| own.mass > 0.0 && self.density(g).is_none())
-        else {
+        let chosen = self.density(g).is_some() || self.has_inertia_chosen(g);
+        let Some(surface) = (wet.surface.as_ref()).filter(|_| own.mass > 0.0 && !chosen) else {
             return Ok(None);
         };
         let mesh = surface.mesh()?;

@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Deepest nesting of elements; URDF needs six, MJCF one a body in a chain.
-const DEEPEST: usize = 128;
+pub(super) const DEEPEST: usize = 128;
 /// Largest number that is taken: squares and products of such stay finite.
 pub(super) const LARGEST: f64 = 1e30;
 

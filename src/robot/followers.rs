@@ -2,6 +2,7 @@
 
 use super::file::File;
 use super::joints::{Dynamics, INSIDE, Led, Moves};
+use super::options::Options;
 use super::report::Report;
 use super::tree::joint_place;
 use crate::{Error, Result};
@@ -43,9 +44,11 @@ fn led(file: &File, number: usize) -> Result<Option<Led>> {
 pub(super) fn follow(
     file: &File,
     joints: &[Option<usize>],
+    options: &Options,
     all: &mut [Option<Moves>],
     report: &mut Report,
 ) -> Result<()> {
+    let mut followers = Vec::new();
     for (b, number) in joints.iter().enumerate() {
         let Some(number) = *number else { continue };
         let Some(led) = led(file, number)? else {
@@ -62,8 +65,53 @@ pub(super) fn follow(
                 "both joints must have one coordinate (revolute, continuous or prismatic): take <mimic> away",
             ));
         };
+        followers.push((b, leader, led.ratio, led.offset));
         give(b, leader, led, all, report);
     }
+    for (_, leader, ..) in &followers {
+        let (Some(moves), Some(number)) = (&mut all[*leader], joints[*leader]) else {
+            continue;
+        };
+        start_within(&joint_place(file, number), moves, options, report)?;
+    }
+    // Once their leaders' starts are known.
+    for (b, leader, ratio, offset) in followers {
+        let start = all[leader].as_ref().and_then(|m| m.start).unwrap_or(0.0);
+        let start = ratio * start + offset;
+        if let Some(follower) = &mut all[b] {
+            follower.start = (start != 0.0).then_some(start);
+        }
+    }
+    Ok(())
+}
+
+/// A leader starts within the limits that it has together with its followers; `place` begins the message where its start, as chosen, doesn't.
+fn start_within(
+    place: &str,
+    moves: &mut Moves,
+    options: &Options,
+    report: &mut Report,
+) -> Result<()> {
+    let start = moves.start.unwrap_or(0.0);
+    let Some([lower, upper]) = moves.limits.filter(|l| !(l[0]..=l[1]).contains(&start)) else {
+        return Ok(());
+    };
+    if options.start.contains_key(&moves.name) {
+        return Err(Error::input(
+            format!("{place}: start"),
+            start,
+            format!(
+                "must be within the limits that it has together with the joints that follow it, from {lower} to {upper}"
+            ),
+        ));
+    }
+    let room = INSIDE * (upper - lower);
+    let q = start.clamp(lower + room, upper - room);
+    report.note(format!(
+        "joint {:?} starts at {q:.6}, since {start} is outside the limits that it has together with its followers, {lower} to {upper}",
+        moves.name
+    ));
+    moves.start = Some(q);
     Ok(())
 }
 
@@ -107,16 +155,5 @@ fn give(b: usize, leader: usize, led: Led, all: &mut [Option<Moves>], report: &m
                 "the limits of joint {name:?} and of the one that it follows have nothing in common: its own aren't used"
             )),
         }
-    }
-    if let Some([lower, upper]) = of.limits {
-        let room = INSIDE * (upper - lower);
-        let q = of.start.unwrap_or(0.0);
-        if !(lower..=upper).contains(&q) {
-            of.start = Some(q.clamp(lower + room, upper - room));
-        }
-    }
-    let start = ratio * of.start.unwrap_or(0.0) + offset;
-    if let Some(follower) = all[b].as_mut() {
-        follower.start = (start != 0.0).then_some(start);
     }
 }

@@ -1,5 +1,6 @@
-//! Convex meshes: hulls with few faces, halves of them, and the same surface with even faces.
+//! Convex meshes: hulls with few faces and with many, and halves of them.
 
+use super::even::of_volume;
 use crate::Result;
 use crate::geometry::TriMesh;
 use crate::shape::file::{FileMesh, Repairs};
@@ -8,6 +9,8 @@ use std::collections::HashSet;
 
 /// Most faces of a hull that things are cut from and touched by.
 pub(super) const MOST_FACES: usize = 96;
+/// Most faces of a hull that the water sees, before it gets those asked for.
+const FINE_FACES: usize = 2048;
 /// Of the extent, the grids that points are put on before their hull is sought: the first merges what is the same, the others are tried where the
 /// first has none, since points that are nearly in one plane may have no hull to rounding.
 const GRIDS: [f64; 3] = [1e-7, 1e-5, 1e-3];
@@ -17,13 +20,30 @@ const GRIDS: [f64; 3] = [1e-7, 1e-5, 1e-3];
 /// # Errors
 /// As [`FileMesh::hull`].
 pub(super) fn hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
+    fewer(whole_hull(name, points)?, MOST_FACES)
+}
+
+/// The convex hull of points as the water sees it: as many faces as it has or, with its volume, as many as can be worked with.
+///
+/// # Errors
+/// As [`hull`].
+pub(super) fn fine_hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
     let whole = whole_hull(name, points)?;
-    if whole.faces().len() <= MOST_FACES {
+    let volume = whole.mass_properties().volume;
+    Ok(match whole.faces().len() <= FINE_FACES {
+        true => whole,
+        false => of_volume(&fewer(whole, FINE_FACES)?, volume),
+    })
+}
+
+/// A hull within or near another with at most so many faces.
+fn fewer(whole: TriMesh, most: usize) -> Result<TriMesh> {
+    if whole.faces().len() <= most {
         return Ok(whole);
     }
     // Vertices that are left move a little off the hull: the hull of these has no more faces than they.
-    match whole.coarsened(MOST_FACES) {
-        Ok(fewer) => whole_hull(name, fewer.vertices()),
+    match whole.coarsened(most) {
+        Ok(fewer) => whole_hull(whole.name(), fewer.vertices()),
         Err(_) => Ok(whole),
     }
 }
@@ -66,8 +86,24 @@ fn on_grid(name: &str, points: &[Vec3], grid: f64) -> FileMesh {
     }
 }
 
-/// The part of a convex mesh where `normal`·x ≤ `level`; none if nothing with a volume is left.
+/// The part of a convex mesh where `normal`·x ≤ `level`, with at most [`MOST_FACES`] faces; none if nothing with a volume is left.
 pub(super) fn half(mesh: &TriMesh, normal: &Vec3, level: f64) -> Option<TriMesh> {
+    part(mesh, normal, level, hull)
+}
+
+/// The same, as the water sees it.
+pub(super) fn fine_half(mesh: &TriMesh, normal: &Vec3, level: f64) -> Option<TriMesh> {
+    part(mesh, normal, level, |name, points| {
+        fine_hull(name, points).or_else(|_| hull(name, points))
+    })
+}
+
+fn part(
+    mesh: &TriMesh,
+    normal: &Vec3,
+    level: f64,
+    hull: impl Fn(&str, &[Vec3]) -> Result<TriMesh>,
+) -> Option<TriMesh> {
     let height = |v: usize| normal.dot(&mesh.vertices()[v]) - level;
     let all = mesh.vertices().iter();
     let mut points: Vec<Vec3> = all.filter(|x| normal.dot(x) <= level).copied().collect();
@@ -86,21 +122,6 @@ pub(super) fn half(mesh: &TriMesh, normal: &Vec3, level: f64) -> Option<TriMesh>
         return None;
     }
     hull(mesh.name(), &points).ok()
-}
-
-/// The same surface with about so many faces, as even as they get; the surface itself where that doesn't keep its volume.
-pub(super) fn even(mesh: &TriMesh, faces: usize) -> TriMesh {
-    let mut fine = mesh.clone();
-    // Four times as many let the collapse choose.
-    while fine.faces().len() < 4 * faces {
-        fine = fine.split();
-    }
-    let volume = mesh.mass_properties().volume;
-    let kept = |m: &TriMesh| (m.mass_properties().volume / volume - 1.0).abs() < 0.02;
-    match fine.coarsened(faces) {
-        Ok(even) if kept(&even) => even,
-        _ => mesh.clone(),
-    }
 }
 
 /// The direction from convex body `a` to `b` along which they lie least in each other, the level that `a` reaches along it, and how deep that is past `b`'s beginning: the

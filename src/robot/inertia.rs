@@ -1,6 +1,7 @@
 //! Masses of links, and of what moves together.
 
 use super::file::File;
+use super::options::LinkChoice;
 use super::tree::{Group, link_place, placed};
 use crate::geometry::impossible_inertia;
 use crate::{Error, Result};
@@ -78,34 +79,49 @@ impl Inertial {
     }
 }
 
-/// Of a link, in its frame, and what was mended in it.
-pub(super) fn of_link(file: &File, link: usize) -> Result<(Inertial, Option<String>)> {
+/// Of a link, in its frame, and what was mended in it; `top` is the link whose frame its body has, and `chosen` what is chosen for that, which may stand in place of what the file says.
+pub(super) fn of_link(
+    file: &File,
+    link: usize,
+    top: usize,
+    chosen: Option<&LinkChoice>,
+) -> Result<(Inertial, Option<String>)> {
     let given = &file.robot.links[link].inertial;
     let mass = given.mass.value;
     let i = &given.inertia;
     let six = [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
-    if mass < 0.0 {
+    let dense = chosen.is_some_and(|c| c.has("density"));
+    let turned = dense || chosen.is_some_and(|c| c.has("inertia"));
+    if mass < 0.0 && !dense {
         return Err(Error::input(
             format!("{}: mass", link_place(file, link)),
             mass,
             "give zero (a massless link) or more, in kg",
         ));
     }
-    if let Some(why) = impossible_inertia(&six, SLACK) {
+    if let Some(why) = impossible_inertia(&six, SLACK).filter(|_| !turned) {
+        let remedy = match top == link {
+            true => "give the link a `density`, from which it follows".to_string(),
+            false => format!(
+                "give link {:?}, whose body it is part of, a `density`, from which that body's follows",
+                file.robot.links[top].name
+            ),
+        };
         return Err(Error::input(
             format!("{}: inertia", link_place(file, link)),
             format!("{six:?} (xx, yy, zz, xy, xz, yz)"),
-            format!("{why}; correct it, or give the link a `density`, from which it follows"),
+            format!("{why}; correct it, or {remedy}"),
         ));
     }
     let mut own = Inertial {
-        mass,
+        // Of a negative one nothing is used but that it is there.
+        mass: mass.abs(),
         center: Vector3::zeros(),
         inertia: Matrix3::new(
             i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
         ),
     };
-    let mended = impossible_inertia(&six, 1e-9).map(|_| {
+    let mended = impossible_inertia(&six, 1e-9).filter(|_| !turned).map(|_| {
         // As much on all moments: then the largest is the sum of the others.
         let [a, b, c] = own.moments();
         let missing = (c - a - b).max(-a);

@@ -174,7 +174,7 @@ fn dynamics(file: &File, number: usize) -> Result<Dynamics> {
         return Ok(Dynamics::default());
     };
     for (field, value) in [("damping", given.damping), ("friction", given.friction)] {
-        if value < 0.0 {
+        if !(value >= 0.0 && value.is_finite()) {
             return Err(Error::input(
                 format!("{}: {field}", joint_place(file, number)),
                 value,
@@ -222,10 +222,22 @@ fn limits(file: &File, number: usize, report: &mut Report) -> Result<Option<[f64
         ));
         return Ok(None);
     }
-    match lower.is_finite() && upper.is_finite() {
-        true => Ok(Some([lower, upper])),
-        false => Ok(None),
+    if lower.is_finite() && upper.is_finite() {
+        return Ok(Some([lower, upper]));
     }
+    // Stops are as wide as a part of the range, so that it has two ends.
+    let one = match (lower.is_finite(), upper.is_finite()) {
+        (true, _) => Some(("lower", lower)),
+        (_, true) => Some(("upper", upper)),
+        _ => None,
+    };
+    if let Some((side, value)) = one {
+        report.note(format!(
+            "joint {:?} has a {side} limit alone, {value}, which isn't kept: here limits have two ends; give the other one too",
+            given.name
+        ));
+    }
+    Ok(None)
 }
 
 /// Where a joint starts: as chosen, else at zero, else just inside its limits.

@@ -4,18 +4,19 @@
 //! What a scene makes of it is in `scene::robot`.
 
 mod bodies;
+mod chosen;
+mod even;
 mod file;
 mod followers;
 mod hull;
 mod inertia;
 mod joints;
 mod mjcf;
-mod mjcf_geometry;
-mod mjcf_left_out;
 mod options;
 mod overlap;
 mod paths;
 mod pieces;
+mod points;
 mod read;
 mod report;
 mod surface;

@@ -58,6 +58,15 @@ pub(crate) struct LinkChoice {
     pub mass: Option<f64>,
     pub density: Option<f64>,
     pub keep: bool,
+    /// What is chosen of the body that the link's frame and name are of, `density` too.
+    pub of_body: Vec<&'static str>,
+}
+
+impl LinkChoice {
+    /// Whether this is chosen of the link's body.
+    pub fn has(&self, key: &str) -> bool {
+        self.of_body.contains(&key)
+    }
 }
 
 /// What is chosen for a robot.

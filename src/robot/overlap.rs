@@ -4,7 +4,7 @@
 //! where the links don't. What lies in each other beyond that is parted by a plane: of two convex bodies the halves on either side of a plane within the overlap are convex and
 //! apart, and what is lost is the overlap and little more. A body that would lose more than half becomes dry.
 
-use super::hull::{half, least_overlap};
+use super::hull::{fine_half, half, least_overlap};
 use super::report::Report;
 use super::surface::{Surface, Wet};
 use crate::Result;
@@ -299,7 +299,8 @@ impl Bodies<'_> {
 
 /// The part of a convex body where `normal`·x ≤ `level`, its pieces for contact with it.
 fn cut(wet: &Wet, normal: &Vec3, level: f64) -> Result<Option<Wet>> {
-    let convex = |surface: &Surface| -> Result<Option<Surface>> {
+    type Half = fn(&TriMesh, &Vec3, f64) -> Option<TriMesh>;
+    let convex = |surface: &Surface, half: Half| -> Result<Option<Surface>> {
         let mesh = surface.mesh()?;
         if mesh.vertices().iter().all(|x| normal.dot(x) <= level) {
             return Ok(Some(surface.clone()));
@@ -309,15 +310,16 @@ fn cut(wet: &Wet, normal: &Vec3, level: f64) -> Result<Option<Wet>> {
     let Some(surface) = wet.surface.as_ref() else {
         return Ok(None);
     };
-    let Some(left) = convex(surface)? else {
+    let Some(left) = convex(surface, fine_half)? else {
         return Ok(None);
     };
     let mut pieces = Vec::new();
     for piece in &wet.pieces {
-        pieces.extend(convex(piece)?);
+        pieces.extend(convex(piece, half)?);
     }
     if pieces.is_empty() && matches!(left, Surface::Mesh { .. }) {
-        pieces.push(left.clone());
+        // Few faces are enough to touch with.
+        pieces.push(convex(surface, half)?.unwrap_or_else(|| left.clone()));
     }
     Ok(Some(Wet {
         surface: Some(left),

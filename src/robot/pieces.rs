@@ -1,9 +1,10 @@
 //! The pieces of geometry that links are made of.
 
 use super::file::File;
-use super::hull::hull;
+use super::hull::{fine_hull, hull};
 use super::options::{BadMeshes, Options, Wet};
 use super::paths::Folders;
+use super::points::points;
 use super::report::{MeshUse, Report};
 use super::tree::{Group, link_place, placed};
 use crate::geometry::TriMesh;
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use urdf_rs::Geometry;
 
-/// Faces of a primitive where a mesh stands for it.
+/// Faces of a primitive where a coarse mesh stands for it.
 const FACES: usize = 80;
 /// Fewest faces that may be asked for.
 const FEWEST: usize = 1;
@@ -41,8 +42,9 @@ pub(super) enum Form {
 pub(super) struct Loaded {
     pub path: PathBuf,
     pub mesh: FileMesh,
-    /// Made when it is first asked for.
+    /// Made when they are first asked for.
     hull: OnceCell<Option<TriMesh>>,
+    fine: OnceCell<Option<TriMesh>>,
 }
 
 impl Loaded {
@@ -81,18 +83,26 @@ impl Loaded {
             path,
             mesh,
             hull: OnceCell::new(),
+            fine: OnceCell::new(),
         })
     }
 
-    /// Its convex hull; none if it has no volume.
+    /// Its convex hull with few faces; none if it has no volume.
     pub fn hull(&self) -> Option<&TriMesh> {
-        let made = || {
-            let used = self.mesh.faces.iter().flatten();
-            let points = used.filter_map(|v| self.mesh.vertices.get(*v));
-            let points: Vec<Vec3> = points.copied().collect();
-            hull(&format!("convex hull of {}", self.path.display()), &points).ok()
-        };
-        self.hull.get_or_init(made).as_ref()
+        self.hull.get_or_init(|| self.made(hull)).as_ref()
+    }
+
+    /// Its convex hull as the water sees it; none if it has no volume.
+    pub fn fine(&self) -> Option<&TriMesh> {
+        let fine = self.fine.get_or_init(|| self.made(fine_hull)).as_ref();
+        fine.or_else(|| self.hull())
+    }
+
+    fn made(&self, hull: impl Fn(&str, &[Vec3]) -> Result<TriMesh>) -> Option<TriMesh> {
+        let used = self.mesh.faces.iter().flatten();
+        let points = used.filter_map(|v| self.mesh.vertices.get(*v));
+        let points: Vec<Vec3> = points.copied().collect();
+        hull(&format!("convex hull of {}", self.path.display()), &points).ok()
     }
 }
 
@@ -101,7 +111,19 @@ pub(super) fn moved(at: &Isometry3<f64>, x: &Vec3) -> Vec3 {
 }
 
 impl Piece {
-    /// Its convex hull in the body's frame; none if it has no volume.
+    /// Points in the body's frame whose hull is its own, as the water sees it.
+    pub fn points(&self) -> Result<Vec<Vec3>> {
+        let own = match &self.form {
+            Form::Primitive(shape) => points(shape)?,
+            Form::Mesh(loaded) => match loaded.fine() {
+                Some(hull) => hull.vertices().to_vec(),
+                None => Vec::new(),
+            },
+        };
+        Ok(own.iter().map(|x| moved(&self.at, x)).collect())
+    }
+
+    /// Its convex hull with few faces in the body's frame; none if it has no volume.
     pub fn hull(&self) -> Result<Option<TriMesh>> {
         let own = match &self.form {
             Form::Primitive(shape) => build(shape, Path::new(""), Some(FACES))?,

@@ -45,6 +45,7 @@ fn parse(path: &Path, text: &str) -> Result<File> {
     let mut look = Look {
         path,
         document: &document,
+        version: version(&document.root_element()),
         unused: BTreeMap::new(),
     };
     look.root()?;
@@ -73,8 +74,20 @@ fn elements<'a, 'd>(
     node: &Node<'a, 'd>,
     name: &'static str,
 ) -> impl Iterator<Item = Node<'a, 'd>> + use<'a, 'd> {
-    node.children()
-        .filter(move |child| child.is_element() && child.tag_name().name() == name)
+    let namespace = node.tag_name().namespace();
+    node.children().filter(move |child| {
+        let tag = child.tag_name();
+        child.is_element() && tag.name() == name && tag.namespace() == namespace
+    })
+}
+
+/// The format's version, 1.0 if the file gives none or no such.
+fn version(robot: &Node) -> [u32; 2] {
+    let given = robot.attribute("version").and_then(|text| {
+        let (major, minor) = text.trim().split_once('.')?;
+        Some([major.parse().ok()?, minor.parse().ok()?])
+    });
+    given.unwrap_or([1, 0])
 }
 
 /// The attributes that are read of an element, by its parent's name and its own; none if the element isn't read.
@@ -102,8 +115,9 @@ fn read_attributes(parent: &str, tag: &str) -> Option<&'static [&'static str]> {
 }
 
 /// The attributes that an element must have.
-fn needed_attributes(tag: &str) -> &'static [&'static str] {
+fn needed_attributes(tag: &str, version: [u32; 2]) -> &'static [&'static str] {
     match tag {
+        "limit" if version >= [1, 2] => &[],
         "link" => &["name"],
         "joint" => &["name", "type"],
         "mass" => &["value"],
@@ -154,6 +168,8 @@ const JOINTS: [&str; 6] = [
 struct Look<'a, 'd> {
     path: &'a Path,
     document: &'a Document<'d>,
+    /// The format's.
+    version: [u32; 2],
     /// What isn't read: how often it stands there, and where first.
     unused: BTreeMap<String, (usize, u32)>,
 }
@@ -223,10 +239,10 @@ impl Look<'_, '_> {
     /// Checks an element and what is in it; the depth is known to be small.
     fn element(&mut self, node: Node, parent: &str) -> Result<()> {
         let tag = node.tag_name().name();
-        let read = match node.tag_name().namespace() {
-            Some(_) => None,
-            None => read_attributes(parent, tag),
-        };
+        // A file may have one namespace for all that is its own.
+        let root = self.document.root_element();
+        let own = node.tag_name().namespace() == root.tag_name().namespace();
+        let read = read_attributes(parent, tag).filter(|_| own);
         let Some(attributes) = read else {
             let what = match parent {
                 "geometry" => {
@@ -239,14 +255,20 @@ impl Look<'_, '_> {
             self.note(what, &node);
             return Ok(());
         };
-        for name in needed_attributes(tag) {
+        let needed = needed_attributes(tag, self.version);
+        for name in needed {
             if node.attribute(*name).is_none_or(|v| v.trim().is_empty()) {
                 return Err(self.wrong(&node, format!("<{tag}> needs the attribute {name}")));
             }
         }
         for attribute in node.attributes() {
             let name = attribute.name();
-            if attributes.contains(&name) || needed_attributes(tag).contains(&name) {
+            if name == "quat_xyzw" && self.version < [1, 1] && attributes.contains(&name) {
+                let why = "which only versions from 1.1 have: <robot version=\"1.1\">";
+                self.note(format!("{name} of <{tag}>, {why}"), &node);
+                continue;
+            }
+            if attributes.contains(&name) || needed.contains(&name) {
                 self.check_numbers(&node, name, attribute.value())?;
             }
             if !attributes.contains(&name) {
@@ -271,7 +293,7 @@ impl Look<'_, '_> {
         let inner: Vec<Node> = node.children().filter(Node::is_element).collect();
         for (i, child) in inner.iter().enumerate() {
             let name = child.tag_name().name();
-            let again = inner[..i].iter().any(|c| c.tag_name().name() == name);
+            let again = (inner[..i].iter()).any(|c| c.tag_name() == child.tag_name());
             let known = read_attributes(tag, name).is_some();
             if (again && once(name) && known) || (tag == "geometry" && i > 0) {
                 let what = format!("<{name}> is one too many in <{tag}>; leave one");

@@ -1,6 +1,7 @@
 //! What the water sees of a body, and what it touches with.
 
-use super::hull::{even, hull};
+use super::even::{even, is_near};
+use super::hull::{fine_hull, hull};
 use super::options::Options;
 use super::pieces::{Form, Meshes, Piece, moved};
 use super::report::Report;
@@ -195,11 +196,14 @@ impl Wet {
         }
         let whole = match &hulls[..] {
             [] => None,
-            [(_, one)] => Some(one.clone()),
+            [(piece, hull)] => Some(fine(name, &[piece]).unwrap_or_else(|| hull.clone())),
             _ => {
-                let points = hulls.iter().flat_map(|(_, hull)| hull.vertices());
-                let points: Vec<Vec3> = points.copied().collect();
-                hull(&format!("convex hull of body {name:?}"), &points).ok()
+                let pieces: Vec<&Piece> = hulls.iter().map(|(piece, _)| *piece).collect();
+                fine(name, &pieces).or_else(|| {
+                    let points = hulls.iter().flat_map(|(_, hull)| hull.vertices());
+                    let points: Vec<Vec3> = points.copied().collect();
+                    hull(&hull_name(name), &points).ok()
+                })
             }
         };
         let Some(whole) = whole else {
@@ -229,8 +233,8 @@ impl Wet {
         })
     }
 
-    /// Gives hulls the faces that the water needs.
-    pub fn finish(&mut self, options: &Options) {
+    /// Gives hulls of the body of this name the faces that the water needs.
+    pub fn finish(&mut self, name: &str, options: &Options, report: &mut Report) {
         if let (Some(Surface::Formula { shape, .. }), Some(faces)) =
             (&mut self.surface, options.faces)
         {
@@ -240,9 +244,26 @@ impl Wet {
         if let Some(Surface::Mesh { mesh, convex }) = &mut self.surface {
             // A mesh with as many faces as that stays what it is.
             if *convex || 2 * mesh.faces().len() < wanted {
-                *mesh = even(mesh, wanted);
+                *mesh = even(mesh, wanted, *convex);
+                let found = mesh.faces().len();
+                if !is_near(found, wanted) {
+                    report.note(format!(
+                        "body {name:?}: its surface has {found} faces, where {wanted} are asked for (`faces`): with about that many it would lose its form"
+                    ));
+                }
             }
             self.said = format!("{}, {} faces", self.said, mesh.faces().len());
         }
     }
+}
+
+fn hull_name(body: &str) -> String {
+    format!("convex hull of body {body:?}")
+}
+
+/// The convex hull of pieces as the water sees it; none where none is found.
+fn fine(body: &str, pieces: &[&Piece]) -> Option<TriMesh> {
+    let each = pieces.iter().map(|piece| piece.points());
+    let points: Vec<Vec<Vec3>> = each.collect::<Result<_>>().ok()?;
+    fine_hull(&hull_name(body), &points.concat()).ok()
 }

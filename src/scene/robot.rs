@@ -50,6 +50,20 @@ pub struct RobotLink {
 }
 
 impl RobotLink {
+    /// What is chosen of the body that the link's frame and name are of, by the keys' names.
+    fn of_body(&self) -> Vec<&'static str> {
+        let keys = [
+            ("density", self.density.is_some()),
+            ("center_of_mass", self.center_of_mass.is_some()),
+            ("inertia", self.inertia.is_some()),
+            ("volume", self.volume.is_some()),
+            ("center_of_buoyancy", self.center_of_buoyancy.is_some()),
+            ("added_mass", self.added_mass.is_some()),
+        ];
+        let given = keys.into_iter().filter(|(_, given)| *given);
+        given.map(|(key, _)| key).collect()
+    }
+
     /// Puts what is chosen in place of what the file says.
     fn apply(&self, body: &mut Body) {
         body.center_of_mass = self.center_of_mass.or(body.center_of_mass);
@@ -167,6 +181,7 @@ impl Robot {
             mass: link.mass,
             density: link.density,
             keep: link.keep,
+            of_body: link.of_body(),
         };
         Options {
             base: self.base,
@@ -251,7 +266,7 @@ impl Scene {
     /// # Errors
     /// [`Error::File`] and [`Error::Parse`] of a file that can't be read, and otherwise [`Error::Input`], with the link or joint: a tree that has loops or several roots, a
     /// negative mass, an inertia that can't be, links that move without inertia, negative damping, joints that follow themselves, limits that can't be, meshes that aren't
-    /// there, choices for links and joints that aren't there, and names that the scene has already.
+    /// there, choices for links and joints that aren't there or that would have no effect, and names that the scene has already.
     pub fn add_robot(&mut self, path: impl AsRef<Path>, options: &Robot) -> Result<Added> {
         let path = path.as_ref();
         let Imported {

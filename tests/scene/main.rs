@@ -6,6 +6,8 @@ mod input;
 #[cfg(feature = "urdf")]
 mod mjcf;
 #[cfg(feature = "urdf")]
+mod mjcf_text;
+#[cfg(feature = "urdf")]
 mod robots;
 mod tradeoff;
 mod validate;

@@ -1,28 +1,41 @@
 //! Robots in MJCF files, as what a URDF file would say of them.
 //!
 //! The tree of bodies becomes links and joints under a massless link `world`; a body with several joints a chain of massless links, and sites links at fixed joints. As a link's frame is
-//! its joint's, that of a body whose joint isn't at its origin is at the joint. `mjcf-rs` reads the file: includes, defaults, angles and frames are resolved there.
+//! its joint's, that of a body whose joint isn't at its origin is at the joint. Files that are included ([`includes`]) and classes of defaults ([`classes`]) are resolved in the text, which is checked there ([`left_out`]); `mjcf-rs` reads what
+//! comes of it ([`flat`]), with its angles and frames.
+
+mod attributes;
+mod classes;
+mod element;
+mod flat;
+mod geometry;
+mod includes;
+mod left_out;
+mod masses;
+mod written;
 
 use super::file::{Extra, File, JointText, LARGEST, guarded};
-use super::inertia::Inertial;
-use super::mjcf_geometry::{Geometries, Solid, isometry};
-use super::mjcf_left_out::LeftOut;
 use super::tree::unplaced;
 use crate::{Error, Result};
-use mjcf_rs::body::{Body, InertiaSpec, Inertial as Given, Joint, JointType};
-use mjcf_rs::compiler::InertiaFromGeom;
+use geometry::{Geometries, Solid, isometry};
+use left_out::LeftOut;
+use mjcf_rs::body::{Body, Joint, JointType};
 use mjcf_rs::equality::Equality;
-use mjcf_rs::{BodyId, Model};
-use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
+use mjcf_rs::{BodyId, Model, Tristate};
+use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Document;
 use std::collections::HashSet;
 use std::path::Path;
 
 /// A file whose outermost element is `mujoco`.
 pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
-    let mut left_out = LeftOut::default();
-    left_out.look(path, document)?;
-    let model = guarded(path, "an MJCF file", || Model::from_file(path))?;
+    let whole = includes::expand(path, document)?;
+    let mut left_out = LeftOut::new(path);
+    left_out.look(&whole)?;
+    let text = written::written(&flat::flat(&whole)?)?;
+    // Files of meshes are looked for from the folder of this file, wherever they are named.
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let model = guarded(path, "an MJCF file", || Model::from_str(&text, folder))?;
     let mut made = Made {
         path,
         model: &model,
@@ -37,9 +50,11 @@ pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
             },
         ),
         taken: HashSet::new(),
+        names: Vec::new(),
         frames: Vec::new(),
     };
-    made.world()?;
+    made.names()?;
+    made.world();
     for (id, _) in model.bodies_iter() {
         made.body(id)?;
     }
@@ -56,6 +71,8 @@ struct Made<'m> {
     file: File,
     /// Names of links.
     taken: HashSet<String>,
+    /// Of each body, its link's.
+    names: Vec<String>,
     /// Of each body, its link's name and the body's frame in the link's.
     frames: Vec<(String, Isometry3<f64>)>,
 }
@@ -92,16 +109,34 @@ impl Made<'_> {
         Ok(isometry(pose))
     }
 
-    /// A name that no link has yet.
-    fn name(&mut self, given: Option<&str>, or: String) -> Result<String> {
-        let name = given.map_or(or, String::from);
-        match self.taken.insert(name.clone()) {
-            true => Ok(name),
-            false => {
+    /// Names the bodies' links before all others: what has no name of its own gets one that is free.
+    fn names(&mut self) -> Result<()> {
+        let named = |body: &Body, id: BodyId| match id {
+            0 => Some("world".to_string()),
+            _ => body.name.clone(),
+        };
+        let given = self.model.bodies.iter().enumerate();
+        let given: Vec<_> = given.map(|(id, entry)| named(&entry.body, id)).collect();
+        for name in given.iter().flatten() {
+            if !self.taken.insert(name.clone()) {
                 let what = format!("body {name:?}");
-                Err(self.wrong(&what, "two of this name", "give each body and site its own"))
+                return Err(self.wrong(&what, "two of this name", "give each body its own"));
             }
         }
+        for (id, name) in given.into_iter().enumerate() {
+            let name = name.unwrap_or_else(|| self.free(format!("body {id}")));
+            self.names.push(name);
+        }
+        Ok(())
+    }
+
+    /// A name that no link has yet: this one, or with a number.
+    fn free(&mut self, name: String) -> String {
+        let numbered = (2..).map(|k| format!("{name} ({k})"));
+        let mut all = std::iter::once(name.clone()).chain(numbered);
+        let free = all.find(|name| !self.taken.contains(name)).unwrap_or(name);
+        self.taken.insert(free.clone());
+        free
     }
 
     /// A site's name: its own, or where a body or another site has it, that and its body's.
@@ -155,8 +190,8 @@ impl Made<'_> {
         &mut self.file.robot.joints[last]
     }
 
-    fn world(&mut self) -> Result<()> {
-        let name = self.name(None, "world".into())?;
+    fn world(&mut self) {
+        let name = self.names[0].clone();
         self.file.robot.links.push(link(&name));
         self.frames.push((name, Isometry3::identity()));
         let world = &self.model.bodies[0].body;
@@ -167,13 +202,12 @@ impl Made<'_> {
                 ));
             }
         }
-        Ok(())
     }
 
     fn body(&mut self, id: BodyId) -> Result<()> {
         let entry = &self.model.bodies[id];
         let body = &entry.body;
-        let name = self.name(body.name.as_deref(), format!("body {id}"))?;
+        let name = self.names[id].clone();
         let of = format!("body {name:?}");
         let above = entry.parent.filter(|p| *p < self.frames.len()).unwrap_or(0);
         let (mut parent, at_parent) = self.frames[above].clone();
@@ -189,7 +223,7 @@ impl Made<'_> {
             let last = k + 1 == count;
             let child = match last {
                 true => name.clone(),
-                false => self.name(None, format!("{name} (joint {})", k + 1))?,
+                false => self.free(format!("{name} (joint {})", k + 1)),
             };
             let anchor = Isometry3::translation(joint.pos[0], joint.pos[1], joint.pos[2]);
             self.joint(joint, &of, k, [&parent, &child], &(at * anchor))?;
@@ -270,6 +304,12 @@ impl Made<'_> {
         let limited = (given.limited).resolve(self.model.compiler.autolimits, rises);
         if limited && !one {
             let note = format!("{place}: the range of a ball joint isn't read");
+            self.file.notes.push(note);
+        }
+        if rises && !limited && given.limited == Tristate::Auto {
+            let note = format!(
+                "{place}: its range isn't used, as autolimits is false and it isn't limited"
+            );
             self.file.notes.push(note);
         }
         let range = given.range.filter(|_| limited && one);
@@ -360,68 +400,24 @@ impl Made<'_> {
             }
             solids.push((geom, (solid, at)));
         }
-        let from_geoms = match (self.model.compiler.inertia_from_geom, &body.inertial) {
-            (InertiaFromGeom::True, _) | (InertiaFromGeom::Auto, None) => true,
-            (InertiaFromGeom::False, _) | (InertiaFromGeom::Auto, Some(_)) => false,
-        };
-        let density = self.model.compiler.inertia_density;
-        let found = match (&body.inertial, from_geoms) {
-            (Some(given), false) => Some(self.inertial(of, given)?),
-            (_, true) => {
-                let each = solids.iter();
-                let parts = each.map(|(geom, solid)| geometries.inertial(geom, solid, density));
-                let parts = parts
-                    .filter_map(Result::transpose)
-                    .collect::<Result<Vec<_>>>()?;
-                Some(Inertial::together(&parts)).filter(|whole| whole.mass > 0.0)
-            }
-            (None, false) => None,
-        };
-        if let Some(found) = found {
-            let compiler = &self.model.compiler;
-            // Bounds of zero are none: what is negative is refused.
-            let least = |x: f64, bound: f64| if bound > 0.0 { x.max(bound) } else { x };
-            let mass = least(found.mass, compiler.bound_mass);
-            let moment = |k: usize| least(found.inertia[(k, k)], compiler.bound_inertia);
+        let found = self.mass(body, of, &geometries, &solids)?;
+        if !found.is_none() {
             let at = own * Isometry3::from(Translation3::from(found.center));
-            let i = found.inertia;
+            let [ixx, iyy, izz, ixy, ixz, iyz] = found.six();
             link.inertial = urdf_rs::Inertial {
                 origin: unplaced(&at),
-                mass: urdf_rs::Mass { value: mass },
+                mass: urdf_rs::Mass { value: found.mass },
                 inertia: urdf_rs::Inertia {
-                    ixx: moment(0),
-                    iyy: moment(1),
-                    izz: moment(2),
-                    ixy: i[(0, 1)],
-                    ixz: i[(0, 2)],
-                    iyz: i[(1, 2)],
+                    ixx,
+                    iyy,
+                    izz,
+                    ixy,
+                    ixz,
+                    iyz,
                 },
             };
         }
         Ok(())
-    }
-
-    /// As given, in the body's axes.
-    fn inertial(&self, of: &str, given: &Given) -> Result<Inertial> {
-        let at = self.checked(&format!("{of}: inertial"), &given.pose)?;
-        let six = match given.inertia {
-            InertiaSpec::Diagonal([x, y, z]) => [x, y, z, 0.0, 0.0, 0.0],
-            InertiaSpec::Full(six) => six,
-        };
-        self.check(of, "mass", &[given.mass])?;
-        if given.mass < 0.0 {
-            let remedy = "give zero (a massless link) or more, in kg";
-            return Err(self.wrong(&format!("{of}: mass"), given.mass, remedy));
-        }
-        self.check(of, "inertia", &six)?;
-        let [xx, yy, zz, xy, xz, yz] = six;
-        let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        let turn = at.rotation.to_rotation_matrix();
-        Ok(Inertial {
-            mass: given.mass,
-            center: at.translation.vector,
-            inertia: turn * inertia * turn.inverse(),
-        })
     }
 
     /// Joints that follow others, and what isn't read.
@@ -465,45 +461,6 @@ impl Made<'_> {
             let note = format!("an <equality> of the kind {what} isn't read");
             if !self.file.notes.contains(&note) {
                 self.file.notes.push(note);
-            }
-        }
-    }
-
-    /// Masses that volumes, densities and factors make have the bounds of those that are written.
-    fn check_masses(&self) -> Result<()> {
-        for link in &self.file.robot.links {
-            let (mass, i) = (link.inertial.mass.value, &link.inertial.inertia);
-            let numbers = [mass, i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
-            self.check(
-                &format!("body {:?}", link.name),
-                "mass and inertia",
-                &numbers,
-            )?;
-        }
-        Ok(())
-    }
-
-    /// Masses in the ratio that makes their sum what is asked for.
-    fn total_mass(&mut self) {
-        let asked = self.model.compiler.set_total_mass;
-        let links = &mut self.file.robot.links;
-        let sum: f64 = links.iter().map(|l| l.inertial.mass.value).sum();
-        if !(asked > 0.0 && sum > 0.0) {
-            return;
-        }
-        let factor = asked / sum;
-        for link in links {
-            link.inertial.mass.value *= factor;
-            let all = &mut link.inertial.inertia;
-            for x in [
-                &mut all.ixx,
-                &mut all.iyy,
-                &mut all.izz,
-                &mut all.ixy,
-                &mut all.ixz,
-                &mut all.iyz,
-            ] {
-                *x *= factor;
             }
         }
     }

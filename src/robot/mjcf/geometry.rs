@@ -1,13 +1,13 @@
 //! Geometry of an MJCF file: shapes, and the mass that follows from them where a body gives none.
 
-use super::inertia::Inertial;
-use super::pieces::Loaded;
+use super::super::inertia::Inertial;
+use super::super::pieces::Loaded;
 use crate::geometry::MassProperties;
 use crate::shape::Shape;
 use crate::{Error, Result};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Geom, GeomType};
-use nalgebra::{Isometry3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +24,9 @@ pub(super) enum Solid {
     /// A file, and factors of its coordinates.
     Mesh(PathBuf, [f64; 3]),
 }
+
+/// A solid, and where it is in the body's frame.
+pub(super) type Placed = (Solid, Isometry3<f64>);
 
 /// The geometry of one body.
 pub(super) struct Geometries<'m> {
@@ -47,11 +50,7 @@ impl<'m> Geometries<'m> {
     }
 
     /// A geom that its frame puts at `pose`, and where it is in the body's frame; none of planes, height fields and distance fields.
-    pub fn read(
-        &self,
-        geom: &Geom,
-        pose: &Isometry3<f64>,
-    ) -> Result<Option<(Solid, Isometry3<f64>)>> {
+    pub fn read(&self, geom: &Geom, pose: &Isometry3<f64>) -> Result<Option<Placed>> {
         let (at, [x, y, z]) = placed(geom, pose);
         let shape = match geom.type_ {
             GeomType::Sphere => Shape::sphere(x),
@@ -92,7 +91,7 @@ impl<'m> Geometries<'m> {
     pub fn inertial(
         &self,
         geom: &Geom,
-        (solid, at): &(Solid, Isometry3<f64>),
+        (solid, at): &Placed,
         density: f64,
     ) -> Result<Option<Inertial>> {
         let found = match solid {
@@ -102,7 +101,7 @@ impl<'m> Geometries<'m> {
             Solid::Mesh(file, scale) => {
                 let loaded = Loaded::new(file.clone(), *scale, &self.place())?;
                 let closed = loaded.mesh.clone().into_mesh().ok();
-                let whole = closed.or_else(|| loaded.hull().cloned());
+                let whole = closed.or_else(|| loaded.fine().cloned());
                 whole.map(|mesh| mesh.mass_properties())
             }
         };
@@ -138,17 +137,22 @@ fn placed(geom: &Geom, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
     let Some([ax, ay, az, bx, by, bz]) = geom.fromto else {
         return (*pose, geom.size);
     };
-    // The pose is that of frames around it. Axes point from the second end to the first.
-    let [a, b] = [[ax, ay, az], [bx, by, bz]].map(|x| (pose * Point3::from(x)).coords);
-    let along = a - b;
-    let turn = Rotation3::rotation_between(&Vector3::z(), &along)
-        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI));
-    let turn = UnitQuaternion::from_rotation_matrix(&turn);
-    let at = Isometry3::from_parts(Translation3::from(0.5 * (a + b)), turn);
+    // The pose is that of frames around it.
+    let at = pose * between([ax, ay, az], [bx, by, bz]);
+    let along = Vector3::new(ax - bx, ay - by, az - bz);
     let (radius, half) = (geom.size[0], 0.5 * along.norm());
     let sizes = match geom.type_ {
         GeomType::Box | GeomType::Ellipsoid => [radius, radius, half],
         _ => [radius, half, 0.0],
     };
     (at, sizes)
+}
+
+/// The frame in the middle of two points whose z axis points from the second one to the first.
+pub(super) fn between(a: [f64; 3], b: [f64; 3]) -> Isometry3<f64> {
+    let [a, b] = [a, b].map(Vector3::from);
+    let turn = Rotation3::rotation_between(&Vector3::z(), &(a - b))
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI));
+    let turn = UnitQuaternion::from_rotation_matrix(&turn);
+    Isometry3::from_parts(Translation3::from(0.5 * (a + b)), turn)
 }

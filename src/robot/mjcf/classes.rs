@@ -1,0 +1,114 @@
+//! Classes of defaults: what elements have that they don't say themselves.
+
+use super::element::Element;
+use crate::Result;
+
+/// The elements that have defaults.
+pub(super) const KINDS: [&str; 5] = ["geom", "joint", "site", "mesh", "equality"];
+/// The class that the others hang on.
+const ROOT: &str = "main";
+
+struct Class<'e> {
+    name: &'e str,
+    parent: Option<usize>,
+    /// Its `<default>` elements: the outermost ones are all of one class.
+    from: Vec<&'e Element>,
+}
+
+/// All classes of a file; number 0 is the outermost one.
+pub(super) struct Classes<'e> {
+    all: Vec<Class<'e>>,
+}
+
+impl<'e> Classes<'e> {
+    /// Those of a whole file.
+    ///
+    /// # Errors
+    /// A class that is there twice, and one without a name.
+    pub fn of(file: &'e Element) -> Result<Self> {
+        let mut made = Self {
+            all: vec![Class {
+                name: ROOT,
+                parent: None,
+                from: Vec::new(),
+            }],
+        };
+        for section in file.all("default") {
+            made.all[0].from.push(section);
+            made.all[0].name = section.get("class").unwrap_or(made.all[0].name);
+        }
+        for section in file.all("default") {
+            made.within(section, 0)?;
+        }
+        Ok(made)
+    }
+
+    fn within(&mut self, section: &'e Element, parent: usize) -> Result<()> {
+        for inner in section.all("default") {
+            let Some(name) = inner.get("class").filter(|name| !name.is_empty()) else {
+                return Err(inner.wrong("a class within another needs a name: class=\"arm\""));
+            };
+            let known = self.all.iter().find(|c| c.name == name || name == ROOT);
+            if let Some(known) = known {
+                let first = known.from.first();
+                let first = first.map_or(String::new(), |first| {
+                    format!(", first in {}, line {}", first.file.display(), first.line)
+                });
+                let what = format!("class {name:?} is there twice{first}; give each its own name");
+                return Err(inner.wrong(what));
+            }
+            self.all.push(Class {
+                name,
+                parent: Some(parent),
+                from: vec![inner],
+            });
+            self.within(inner, self.all.len() - 1)?;
+        }
+        Ok(())
+    }
+
+    /// The class that an attribute (`class` or `childclass`) of an element names; none where it has none.
+    ///
+    /// # Errors
+    /// A class that isn't there.
+    pub fn named(&self, element: &Element, attribute: &str) -> Result<Option<usize>> {
+        let Some(name) = element.get(attribute) else {
+            return Ok(None);
+        };
+        let found = self.all.iter().position(|class| class.name == name);
+        if found.is_some() || name == ROOT {
+            return Ok(Some(found.unwrap_or(0)));
+        }
+        let names: Vec<&str> = self.all.iter().map(|class| class.name).collect();
+        let what = format!("{attribute} = {name:?}: there is no such class; there are {names:?}");
+        Err(element.wrong(what))
+    }
+
+    /// An element of this kind with all that it has by its class, or else by `around`, that of the bodies and frames around it: what is its own stands for what its
+    /// class gives, and that for what the class has of those that it hangs on.
+    ///
+    /// # Errors
+    /// A class that isn't there.
+    pub fn resolved(
+        &self,
+        element: &Element,
+        kind: &str,
+        around: Option<usize>,
+    ) -> Result<Element> {
+        let first = self.named(element, "class")?.or(around).unwrap_or(0);
+        let up = std::iter::successors(Some(first), |class| self.all[*class].parent);
+        let mut chain: Vec<usize> = up.collect();
+        chain.reverse();
+        let mut made = Element::at(&element.tag, element);
+        let given = (chain.iter()).flat_map(|class| &self.all[*class].from);
+        let given = given.flat_map(|section| section.all(kind));
+        // Names are each element's own.
+        let given = given.flat_map(|e| e.attributes.iter().filter(|(name, _)| name != "name"));
+        for (name, value) in given.chain(&element.attributes) {
+            if name != "class" {
+                made.set(name, value);
+            }
+        }
+        Ok(made)
+    }
+}

@@ -1,0 +1,141 @@
+//! The file as one that leaves nothing to be looked up: no includes, no classes, and of elements and attributes those that are read.
+
+use super::attributes::{numbers, read};
+use super::classes::Classes;
+use super::element::{Element, TURNS};
+use super::geometry::between;
+use crate::Result;
+
+/// Sections, in the order in which they are to be read.
+const SECTIONS: [&str; 4] = ["compiler", "asset", "worldbody", "equality"];
+/// Shapes that may lie between two points.
+const LONG: [&str; 4] = ["capsule", "cylinder", "box", "ellipsoid"];
+
+/// The file with one section of each kind.
+///
+/// # Errors
+/// Classes that aren't there or are there twice, and what elements can't be once they have what their classes give.
+pub(super) fn flat(file: &Element) -> Result<Element> {
+    let classes = Classes::of(file)?;
+    let mut made = own(file, "mujoco");
+    let [mut compiler, mut asset, mut world, mut equality] =
+        SECTIONS.map(|tag| Element::at(tag, file));
+    for section in file.all("compiler") {
+        for (name, value) in &own(section, "compiler").attributes {
+            compiler.set(name, value);
+        }
+    }
+    for mesh in file.all("asset").flat_map(|section| section.all("mesh")) {
+        let mesh = classes.resolved(mesh, "mesh", None)?;
+        asset.children.push(own(&mesh, "mesh"));
+    }
+    for section in file.all("worldbody") {
+        content(&classes, section, None, &mut world)?;
+    }
+    for section in file.all("equality") {
+        for one in &section.children {
+            match &one.tag[..] {
+                "joint" => {
+                    let one = classes.resolved(one, "equality", None)?;
+                    equality.children.push(own(&one, "coupling"));
+                }
+                // Of these it is told that they are there.
+                tag @ ("connect" | "weld" | "tendon") => {
+                    equality.children.push(Element::at(tag, one));
+                }
+                _ => {}
+            }
+        }
+    }
+    made.children = vec![compiler, asset, world, equality];
+    Ok(made)
+}
+
+/// An element without its children, and without attributes that aren't read.
+fn own(element: &Element, kind: &str) -> Element {
+    let mut made = Element::at(&element.tag, element);
+    let kept = (element.attributes.iter())
+        .filter(|(name, _)| read(kind, name).is_some() && !name.ends_with("class"));
+    made.attributes = kept.cloned().collect();
+    made
+}
+
+/// What is in a body, or a frame of one; `around` is the class of what is around it.
+fn content(
+    classes: &Classes,
+    from: &Element,
+    around: Option<usize>,
+    into: &mut Element,
+) -> Result<()> {
+    let around = classes.named(from, "childclass")?.or(around);
+    for inner in &from.children {
+        let tag = &inner.tag[..];
+        let made = match tag {
+            "body" | "frame" => {
+                let mut made = own(inner, tag);
+                content(classes, inner, around, &mut made)?;
+                made
+            }
+            "inertial" | "freejoint" => own(inner, tag),
+            "joint" => own(&classes.resolved(inner, tag, around)?, tag),
+            "geom" => geom(own(&classes.resolved(inner, tag, around)?, tag))?,
+            "site" => site(own(&classes.resolved(inner, tag, around)?, tag)),
+            _ => continue,
+        };
+        into.children.push(made);
+    }
+    Ok(())
+}
+
+fn unplace(element: &mut Element) {
+    (element.attributes).retain(|(name, _)| name != "pos" && !TURNS.contains(&&name[..]));
+}
+
+/// Points that it lies between say where it is.
+fn geom(mut made: Element) -> Result<Element> {
+    let kind = made.get("type").unwrap_or("sphere").to_owned();
+    if made.get("fromto").is_some() {
+        if !LONG.contains(&&kind[..]) {
+            let what = format!(
+                "a {kind} can't lie between two points (fromto): {} can",
+                LONG.join(", ")
+            );
+            return Err(made.wrong(what));
+        }
+        unplace(&mut made);
+    }
+    if let Some(mesh) = made.get("mesh").filter(|_| kind != "mesh" && kind != "sdf") {
+        let what = format!(
+            "a {kind} that is fitted to the mesh {mesh:?} isn't read: write its size, or type=\"mesh\""
+        );
+        return Err(made.wrong(what));
+    }
+    // Bits of groups: here it counts whether there are any.
+    for name in ["contype", "conaffinity"] {
+        let bits = made
+            .get(name)
+            .and_then(|bits| bits.trim().parse::<i64>().ok());
+        if let Some(bits) = bits {
+            made.set(name, if bits == 0 { "0" } else { "1" });
+        }
+    }
+    Ok(made)
+}
+
+/// Points that it lies between are its middle and its axis.
+fn site(mut made: Element) -> Element {
+    let ends = made.get("fromto").and_then(numbers);
+    if let Some(&[a, b, c, d, e, f]) = ends.as_deref() {
+        unplace(&mut made);
+        let at = between([a, b, c], [d, e, f]);
+        let [x, y, z]: [f64; 3] = at.translation.vector.into();
+        let turn = at.rotation.quaternion();
+        made.set("pos", &format!("{x} {y} {z}"));
+        made.set(
+            "quat",
+            &format!("{} {} {} {}", turn.w, turn.i, turn.j, turn.k),
+        );
+    }
+    (made.attributes).retain(|(name, _)| name != "fromto");
+    made
+}

@@ -18,6 +18,7 @@ pub mod gpu;
 mod memory;
 pub mod multibody;
 pub mod notation;
+mod once;
 #[cfg(feature = "opt")]
 pub mod optimize;
 #[cfg(feature = "output")]

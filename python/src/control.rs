@@ -371,6 +371,14 @@ impl Planner {
         }
     }
 
+    /// Keeps a plan more, unless it is the last.
+    fn add(&self, plan: Option<&Replan>) {
+        let mut kept = lock(&self.replans);
+        if kept.last() != plan {
+            kept.extend(plan.cloned());
+        }
+    }
+
     /// Keeps the plans for those who ask.
     fn keep(&self, plans: &[Replan]) {
         let mut kept = lock(&self.replans);
@@ -542,7 +550,7 @@ impl Mpc {
             let state = start(state.as_ref(), &theirs)?;
             let made = planner.work("run", interrupt, |mpc| {
                 mpc.run(&theirs, &state, steps, &cost, |p| {
-                    planner.keep(p.all);
+                    planner.add(p.last.as_ref());
                     interrupt.at(p.step)
                 })
             })?;

@@ -7,6 +7,7 @@ use crate::adjoint::lie::{Mat6, Vec6};
 use crate::adjoint::rigid;
 use crate::adjoint::solve::{Definite, is_scaled_above, smallest_scaled_eigenvalue};
 use crate::multibody::Articulated;
+use crate::once::once;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -46,7 +47,7 @@ impl<'a> Evaluation<'a> {
 
     /// M(q), user coordinates, nv × nv: made when it is first asked for. Its products and solves don't ask for it where no body feels another.
     pub fn mass_matrix(&self) -> &DMatrix<f64> {
-        self.mass_matrix.get_or_init(|| {
+        once(&self.mass_matrix, || {
             let made = match self.fluid {
                 FluidMomenta::Coupled(_) => self.rigid_and_coupled(),
                 FluidMomenta::Apart(_) | FluidMomenta::Still | FluidMomenta::Scattered(_) => {

@@ -4,6 +4,7 @@ use super::Evaluation;
 use super::fluid::FluidMomenta;
 use super::island_matrix::{IslandMatrix, MANY};
 use super::islands::Islands;
+use crate::once::once;
 
 impl Evaluation<'_> {
     /// One where the water couples the bodies or a force may; else one for the trees of joints that forces tie together. Contact isn't asked, nor what many bodies
@@ -56,7 +57,7 @@ impl Evaluation<'_> {
 
     /// M(q) by islands, but for what many bodies exchange by products: made when it is first asked for.
     pub(super) fn mass_blocks(&self) -> &IslandMatrix {
-        self.mass_blocks.get_or_init(|| {
+        once(&self.mass_blocks, || {
             let islands = self.islands();
             let few = islands.velocities() < MANY || islands.is_whole();
             if few && self.scattered().is_none() {

@@ -8,6 +8,7 @@ use crate::adjoint::step::{self, Tape};
 use crate::dynamics::{ContactForce, State, StateBar, StepRecord};
 use crate::error::readable;
 use crate::geometry::Gap;
+use crate::once::once;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -125,14 +126,12 @@ impl Rollout {
     /// meet. Pairs that never move relative to one another, and those declared to overlap, don't
     /// count. They are measured at the first call.
     pub fn gaps(&self) -> &[Option<Gap>] {
-        if let Some(made) = self.gaps.get() {
-            return made;
-        }
-        // Not while others wait: a thread that measures may be asked for them meanwhile. Whoever else made them made the same.
-        let samples = self.samples().par_iter();
-        let gaps = samples.map(|s| self.simulator.gaps().smallest(&s.poses));
-        let made = gaps.collect();
-        self.gaps.get_or_init(|| made)
+        let made: &Vec<_> = once(&self.gaps, || {
+            let samples = self.samples().par_iter();
+            let gaps = samples.map(|s| self.simulator.gaps().smallest(&s.poses));
+            gaps.collect()
+        });
+        made
     }
 
     /// Number of pieces in which each step was made: one where it wasn't cut ([`Stepper::step`](crate::dynamics::Stepper::step)).

@@ -8,11 +8,13 @@ use std::path::Path;
 /// `Error` and `Result` alone.
 ///
 /// `adjoint::lie` gives vectors and poses to everyone; the modules marked `adjoint` use the ladder too.
-const LAYERS: [(&str, &[&str]); 24] = [
+const LAYERS: [(&str, &[&str]); 25] = [
     ("error", &[]),
     // What enums that users choose from can do.
     ("choices", &[]),
     ("special", &[]),
+    // What is made when it is first asked for.
+    ("once", &[]),
     // What computations may take.
     ("memory", &[]),
     // Closed meshes and walls, and what is asked of them.
@@ -25,11 +27,13 @@ const LAYERS: [(&str, &[&str]); 24] = [
     ("solver", &["adjoint"]),
     (
         "boundary",
-        &["adjoint", "geometry", "memory", "solver", "special"],
+        &["adjoint", "geometry", "memory", "once", "solver", "special"],
     ),
     (
         "coupling",
-        &["adjoint", "boundary", "geometry", "memory", "solver"],
+        &[
+            "adjoint", "boundary", "geometry", "memory", "once", "solver",
+        ],
     ),
     (
         "gpu",
@@ -43,6 +47,7 @@ const LAYERS: [(&str, &[&str]); 24] = [
             "contact",
             "coupling",
             "multibody",
+            "once",
             "scene",
             "solver",
         ],
@@ -94,6 +99,7 @@ const LAYERS: [(&str, &[&str]); 24] = [
             "geometry",
             "memory",
             "multibody",
+            "once",
             "policy",
             "scene",
             "shape",

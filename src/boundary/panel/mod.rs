@@ -33,6 +33,7 @@ use crate::adjoint::kernel::Write;
 use crate::adjoint::lie::{Mat6, Vec3, Vec6};
 use crate::geometry::{Faces, TriMesh};
 use crate::memory;
+use crate::once::once;
 use crate::solver::{Columns, Lu, product, transposed_product};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -213,7 +214,8 @@ impl PanelBoundary {
 
     /// `(½I + Ω/4π)⁻¹`, column-major.
     pub(crate) fn inverse(&self) -> &[f64] {
-        self.inverse.get_or_init(|| self.lu.inverse())
+        let made: &Vec<f64> = once(&self.inverse, || self.lu.inverse());
+        made
     }
 
     /// `(½I + Ω/4π)⁻¹ x`, or its transpose. By the inverse, as a product runs on all threads and triangular solves don't.

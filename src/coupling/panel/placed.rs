@@ -8,6 +8,7 @@ use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::Pair;
 use crate::coupling::response::{self, body_twists, moves};
 use crate::coupling::{CoupledResponse, Direction, PairTensor, Reached, ShapeTerm, Tangent};
+use crate::once::once;
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -220,10 +221,11 @@ impl<'a> PanelSolution<'a> {
 
     /// Of every pair: ∇(S q − Ω/4π φ) of its panels at its points, `[point][column][3]`.
     pub fn fields(&self) -> &[Vec<f64>] {
-        self.fields.get_or_init(|| {
+        let made: &Vec<_> = once(&self.fields, || {
             let pairs = self.placed.pairs.iter();
             pairs.map(|pair| self.placed.fields(pair, self)).collect()
-        })
+        });
+        made
     }
 
     /// One column from coefficients on those there are.

@@ -15,6 +15,7 @@ use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
     Pullback, ShapeTerm, SurfacePotential, Tangent,
 };
+use crate::once::once;
 use crate::solver::Cholesky;
 use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
@@ -215,7 +216,7 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     fn fields(&self) -> &[Fields] {
-        self.fields.get_or_init(|| {
+        let made: &Vec<_> = once(&self.fields, || {
             let columns = self.alpha.ncols();
             let one = |placed: &PlacedSkeletons| {
                 let (t, s) = (self.range(placed.link.target), &placed.pair.points);
@@ -229,7 +230,8 @@ impl<'a> ReducedLinearised<'a> {
                 Fields { field, sums }
             };
             self.reduced.over(&self.placed, columns * PULL, one)
-        })
+        });
+        made
     }
 
     /// ∇_g E(x, e_k) for every column e_k of the basis: spatial wrenches on the bodies.

@@ -7,16 +7,16 @@ use crate::{Error, Result};
 use std::ops::ControlFlow;
 
 /// State of a run after a step of the plant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MpcProgress<'a> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct MpcProgress {
     /// Steps of the plant made.
     pub step: usize,
     /// Steps that it is to make.
     pub steps: usize,
     /// Plans made.
     pub replans: usize,
-    /// All plans so far, with those of earlier runs that this one goes on from.
-    pub all: &'a [Replan],
+    /// The last of them; one of an earlier run where this one goes on from it.
+    pub last: Option<Replan>,
 }
 
 /// What became of a plant.
@@ -54,7 +54,7 @@ impl Mpc {
         start: &State,
         steps: usize,
         cost: &Cost,
-        mut progress: impl FnMut(&MpcProgress<'_>) -> ControlFlow<()> + Send,
+        mut progress: impl FnMut(&MpcProgress) -> ControlFlow<()> + Send,
     ) -> Result<MpcRun> {
         check_plant(Sizes::of(plant), self.ready.cost.sizes)?;
         let bound = cost.bind(plant)?;
@@ -72,7 +72,7 @@ impl Mpc {
                 step: n,
                 steps,
                 replans: self.replans.len() - before,
-                all: &self.replans,
+                last: self.replans.last().cloned(),
             };
             if progress(&told).is_break() {
                 return Err(Error::Stopped {

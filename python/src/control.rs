@@ -355,7 +355,7 @@ impl Planner {
                 *lock(&self.work) = interrupt.clone();
                 return Ok(free);
             }
-            if !lock(&self.work).is_left() || rayon::current_thread_index().is_some() {
+            if !lock(&self.work).is_left() || interrupt.is_within() {
                 return Err(Error::Unsupported {
                     what: format!("Mpc.{what} during run or control of the same Mpc"),
                     why: "it plans for one at a time".into(),

@@ -23,6 +23,8 @@ pub struct Interrupt {
     stop: Arc<AtomicBool>,
     left: Arc<AtomicBool>,
     done: Arc<AtomicUsize>,
+    /// Whether a thread that work waits for does this itself, where it stands.
+    here: bool,
     /// What follows work that the thread does which asked for it.
     own: Option<Arc<Own>>,
 }
@@ -51,6 +53,11 @@ impl Interrupt {
     pub fn one_more(&self) -> ControlFlow<()> {
         self.done.fetch_add(1, Ordering::Relaxed);
         self.check()
+    }
+
+    /// Whether it must not wait for other work, which may be waiting for it.
+    pub fn is_within(&self) -> bool {
+        self.here
     }
 
     /// Whether Ctrl-C has left the work to itself: it has been asked to stop, and nobody waits for it.
@@ -301,6 +308,7 @@ fn followed_here<T: Send>(
     work: impl FnOnce(&Interrupt) -> hydrograd::Result<T> + Send,
 ) -> PyResult<T> {
     let interrupt = Interrupt {
+        here: true,
         own: progress.take().map(|progress| Arc::new(Own::new(progress))),
         ..Interrupt::default()
     };

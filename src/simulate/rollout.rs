@@ -126,12 +126,12 @@ impl Rollout {
     /// meet. Pairs that never move relative to one another, and those declared to overlap, don't
     /// count. They are measured at the first call.
     pub fn gaps(&self) -> &[Option<Gap>] {
-        let made: &Vec<_> = once(&self.gaps, || {
+        let made = once(&self.gaps, || {
             let samples = self.samples().par_iter();
             let gaps = samples.map(|s| self.simulator.gaps().smallest(&s.poses));
             gaps.collect()
         });
-        made
+        made.as_slice()
     }
 
     /// Number of pieces in which each step was made: one where it wasn't cut ([`Stepper::step`](crate::dynamics::Stepper::step)).

@@ -3,7 +3,7 @@
 use super::clearance::Clearance;
 use super::gap_error::{Across, Carried, GapError};
 use super::resolved::{Resolved, narrowest};
-use crate::adjoint::lie::Pose;
+use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::film::{Extent, Films};
 use crate::geometry::{Gap, Other};
 use std::f64::consts::PI;
@@ -106,19 +106,26 @@ impl GapModel {
             return 0.0;
         }
         let gaps = &clearance.moving;
-        let bodies: Vec<usize> = gap.sides().map(|(b, _)| b).collect();
-        let facing = |of: &Gap, body: usize| {
+        // Each body with the direction in which its faces at a gap look.
+        let facing = |of: &Gap| -> Vec<(usize, Vec3)> {
             let near = gaps.near_faces(of, beyond(of), poses);
-            let side = of.sides().position(|(b, _)| b == body)?;
-            near[side].facing.try_normalize(0.0)
+            let each = of.sides().zip(near);
+            each.filter_map(|((b, _), near)| Some((b, near.facing.try_normalize(0.0)?)))
+                .collect()
         };
+        let here = facing(gap);
         let met = |other: &Gap| {
-            let body = bodies.iter().find(|b| other.touches(**b))?;
-            let cosine = facing(gap, *body)?.dot(&facing(other, *body)?);
+            let there = facing(other);
+            let both = here
+                .iter()
+                .flat_map(|own| there.iter().map(move |x| (own, x)));
+            let cosine = both
+                .filter(|(a, b)| a.0 == b.0)
+                .map(|(a, b)| a.1.dot(&b.1))
+                .next()?;
             Some(into(other) * (1.0 - cosine * cosine))
         };
-        let near = gaps.within(poses, self.widest()).into_iter();
-        let others = near.filter(|o| (o.first, o.second) != (gap.first, gap.second));
+        let others = gaps.beside(gap, poses, self.widest()).into_iter();
         own * others.filter_map(|o| met(&o)).fold(0.0, f64::max)
     }
 }

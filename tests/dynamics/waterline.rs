@@ -1,5 +1,6 @@
 //! Bodies at the surface of the water: displaced volume, stiffness, energy, drag, gradients.
 
+use crate::support::check_gradient;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
 use hydrograd::simulate::gradcheck::{GradcheckSettings, gradcheck};
@@ -142,6 +143,19 @@ fn deep_water_has_no_surface_and_air_no_water() {
     assert!((air[2] / weight - 1.0).abs() < 1e-12);
 }
 
+/// Over 1000 steps without controls, of the largest kinetic energy.
+#[track_caller]
+fn keeps_energy(sim: &Simulator, limit: f64) {
+    let rollout = sim.rollout(&Controls::zeros(sim, 1000)).unwrap();
+    let samples = rollout.samples();
+    let kinetic = samples.iter().map(|s| s.kinetic_energy);
+    let (scale, first) = (kinetic.fold(0.0, f64::max), samples[0].energy());
+    for s in samples {
+        let error = (s.energy() - first) / scale;
+        assert!(error.abs() < limit, "{error:.1e} at {} s", s.time);
+    }
+}
+
 /// A box bobs and rolls through the surface: what gravity and water give and take is their energy.
 #[test]
 fn bobbing_keeps_energy() {
@@ -154,14 +168,7 @@ fn bobbing_keeps_energy() {
         scene.initial.v = vec![0.0, 0.0, 0.0, 0.6, 0.3, 0.1];
         scene.time_step = 2e-3;
         let sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
-        let rollout = sim.rollout(&Controls::zeros(&sim, 1000)).unwrap();
-        let samples = rollout.samples();
-        let kinetic = samples.iter().map(|s| s.kinetic_energy);
-        let (scale, first) = (kinetic.fold(0.0, f64::max), samples[0].energy());
-        for s in samples {
-            let error = (s.energy() - first) / scale;
-            assert!(error.abs() < 2e-5, "{error:.1e} at {} s", s.time);
-        }
+        keeps_energy(&sim, 2e-5);
     }
 }
 
@@ -240,23 +247,8 @@ fn given_volumes_and_centres_are_buoyant_below_a_surface() {
     }
     scene.time_step = 2e-3;
     let mut sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
-    let rollout = sim.rollout(&Controls::zeros(&sim, 1000)).unwrap();
-    let samples = rollout.samples();
-    let kinetic = samples.iter().map(|s| s.kinetic_energy);
-    let (scale, first) = (kinetic.fold(0.0, f64::max), samples[0].energy());
-    for s in samples {
-        let error = (s.energy() - first) / scale;
-        assert!(error.abs() < 2e-4, "{error:.1e} at {} s", s.time);
-    }
-    let settings = GradcheckSettings {
-        steps: 30,
-        directions: 3,
-        seed: 5,
-        timings: 0,
-        enough: Some(1e-6),
-    };
-    let report = gradcheck(&mut sim, &settings).unwrap();
-    assert!(report.max_rel_error < 1e-6, "{report:?}");
+    keeps_energy(&sim, 2e-4);
+    check_gradient("given volumes", &mut sim, 30, 3, 1e-6);
 }
 
 /// A surface needs gravity.

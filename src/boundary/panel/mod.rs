@@ -214,8 +214,7 @@ impl PanelBoundary {
 
     /// `(½I + Ω/4π)⁻¹`, column-major.
     pub(crate) fn inverse(&self) -> &[f64] {
-        let made: &Vec<f64> = once(&self.inverse, || self.lu.inverse());
-        made
+        once(&self.inverse, || self.lu.inverse()).as_slice()
     }
 
     /// `(½I + Ω/4π)⁻¹ x`, or its transpose. By the inverse, as a product runs on all threads and triangular solves don't.

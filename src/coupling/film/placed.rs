@@ -82,14 +82,9 @@ impl PlacedFilm {
         let Some(layer) = Layer::new(film, &still, &near, None) else {
             return Ok(None);
         };
-        let squeezed = || NoFilm::Squeezed {
-            gap: layer.gap.value,
-            held: layer.least_held(),
-        };
-        if layer.least_held() <= 0.0 {
-            return Err(squeezed());
-        }
-        let system = film.system(&layer).ok_or_else(squeezed)?;
+        let (gap, held) = (layer.gap.value, layer.least_held());
+        let system = film.system(&layer).filter(|_| held > 0.0);
+        let system = system.ok_or(NoFilm::Squeezed { gap, held })?;
         let mut out = Self {
             film: film.clone(),
             relative,

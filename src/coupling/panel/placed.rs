@@ -221,11 +221,11 @@ impl<'a> PanelSolution<'a> {
 
     /// Of every pair: ∇(S q − Ω/4π φ) of its panels at its points, `[point][column][3]`.
     pub fn fields(&self) -> &[Vec<f64>] {
-        let made: &Vec<_> = once(&self.fields, || {
+        let made = once(&self.fields, || {
             let pairs = self.placed.pairs.iter();
             pairs.map(|pair| self.placed.fields(pair, self)).collect()
         });
-        made
+        made.as_slice()
     }
 
     /// One column from coefficients on those there are.

@@ -216,7 +216,7 @@ impl<'a> ReducedLinearised<'a> {
     }
 
     fn fields(&self) -> &[Fields] {
-        let made: &Vec<_> = once(&self.fields, || {
+        let made = once(&self.fields, || {
             let columns = self.alpha.ncols();
             let one = |placed: &PlacedSkeletons| {
                 let (t, s) = (self.range(placed.link.target), &placed.pair.points);
@@ -231,7 +231,7 @@ impl<'a> ReducedLinearised<'a> {
             };
             self.reduced.over(&self.placed, columns * PULL, one)
         });
-        made
+        made.as_slice()
     }
 
     /// ∇_g E(x, e_k) for every column e_k of the basis: spatial wrenches on the bodies.

@@ -158,8 +158,8 @@ impl ForceModel for Springs {
             let (stiffness, damping) = (parameters[spring.stiffness], parameters[spring.damping]);
             if s.length == 0.0 {
                 if parameters[spring.rest_length] == 0.0 {
-                    let d_bar = -stiffness * spring.rate(&s.ends, z.twists);
-                    spring.pull(&s.ends, &-d_bar, bar.pose);
+                    let pulled = stiffness * spring.rate(&s.ends, z.twists);
+                    spring.pull(&s.ends, &pulled, bar.pose);
                 }
                 continue;
             }

@@ -46,23 +46,20 @@ fn bounded(x: f64) -> (f64, f64) {
     (x.signum() * (WHOLE + WHOLE * over), 1.0 - over * over)
 }
 
-/// Whether a step is one that can be closed: in still water or where all may drift with it, of joints that nothing drives, and with some motion beside that of all bodies together.
-fn closes(start: &Start) -> bool {
+/// B, of a step that can be closed: in still water or where all may drift with it, of joints that nothing drives, and with some motion beside that of all bodies together. What would move a
+/// joint that is held isn't of it.
+fn common(start: &Start) -> Option<Motions> {
     let (s, split) = (start.stepper, start.split);
+    let common = s.system.symmetric.sparing(&split.is_driven);
     let drift = &s.system.drift;
     let still = &split.driven - drift.velocity();
     let mut driven = split.is_driven.iter().zip(still.iter());
-    drift.is_whole()
-        && common(start).len() < split.free.len()
+    let closes = drift.is_whole()
+        && common.len() < split.free.len()
         && !split.moved.contains(&true)
         && driven.all(|(driven, v)| !driven || *v == 0.0)
-        && s.split_at(start.state).is_driven == split.is_driven
-}
-
-/// The rigid motions of all bodies together that no joint is held against.
-fn common(start: &Start) -> Motions {
-    let symmetric = &start.stepper.system.symmetric;
-    symmetric.sparing(&start.split.is_driven)
+        && s.split_at(start.state).is_driven == split.is_driven;
+    closes.then_some(common)
 }
 
 /// Velocities of a step relative to the drift.
@@ -113,6 +110,7 @@ impl Parts {
     /// Of the step with these velocities that ends at `end` with the frame momenta `hat`; none where there is nothing to take energy from.
     fn new(
         start: &Start,
+        basis: Motions,
         velocities: &ContactVelocities,
         end: &Evaluation,
         hat: &DVector<f64>,
@@ -121,7 +119,6 @@ impl Parts {
         let drifting = Drifting::new(start, velocities);
         let (before, after) = (&drifting.before, &drifting.after);
         let v = readout::solve(end, split, hat)? - s.system.drift.velocity();
-        let basis = common(start);
         let (mut together, mut common, mut direction) =
             (DVector::zeros(v.len()), None, hat.clone());
         if !basis.is_empty() {
@@ -192,14 +189,14 @@ pub(super) fn close(
     velocities: &ContactVelocities,
     mut next: State,
 ) -> Result<State> {
-    if !closes(start) {
+    let Some(basis) = common(start) else {
         return Ok(next);
-    }
+    };
     let s = start.stepper;
     let end = s
         .system
         .evaluate_apart(s.parameters, &next.q, s.time(&next))?;
-    if let Some(parts) = Parts::new(start, velocities, &end, &next.y)? {
+    if let Some(parts) = Parts::new(start, basis, velocities, &end, &next.y)? {
         let mut change = parts.change() * &parts.direction;
         start.split.forget_driven(&mut change);
         next.y += change;
@@ -229,14 +226,14 @@ impl<'a> Closure<'a> {
         velocities: &ContactVelocities,
         next: &State,
     ) -> Result<Option<Self>> {
-        if !closes(start) {
+        let Some(basis) = common(start) else {
             return Ok(None);
-        }
+        };
         let s = start.stepper;
         let end = s
             .system
             .linearise_apart(s.parameters, &next.q, s.time(next))?;
-        let parts = Parts::new(start, velocities, &end, &next.y)?;
+        let parts = Parts::new(start, basis, velocities, &end, &next.y)?;
         Ok(parts.map(|parts| Self {
             end,
             hat: next.y.clone(),

@@ -46,8 +46,30 @@ impl Gaps {
 
     /// The gaps below `distance` (m), in the order of [`Gaps::all`].
     pub fn within(&self, poses: &[Pose], distance: f64) -> Vec<Gap> {
+        self.among(poses, distance, |_| true)
+    }
+
+    /// Those of a gap's bodies with others.
+    pub(crate) fn beside(&self, gap: &Gap, poses: &[Pose], distance: f64) -> Vec<Gap> {
+        let itself = (gap.first, gap.second);
+        self.among(poses, distance, |pair @ (a, b)| {
+            let bodies = [Other::Body(a), b];
+            pair != itself
+                && gap
+                    .sides()
+                    .any(|(own, _)| bodies.contains(&Other::Body(own)))
+        })
+    }
+
+    /// Those of some pairs.
+    fn among(
+        &self,
+        poses: &[Pose],
+        distance: f64,
+        wanted: impl Fn((usize, Other)) -> bool,
+    ) -> Vec<Gap> {
         let near = self.candidates(poses, &self.balls(poses), distance);
-        let near = near.into_iter();
+        let near = near.into_iter().filter(|c| wanted(c.pair));
         near.filter_map(|c| self.gap(c.pair, poses, f64::INFINITY))
             .filter(|gap| gap.distance < distance)
             .collect()

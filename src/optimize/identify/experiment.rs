@@ -243,12 +243,13 @@ impl Experiment {
         let mut found: HashMap<(&str, usize), Vec<f64>> = HashMap::new();
         for r in &self.recorded {
             let name = r.observable.as_str();
+            let seen_as = observable(name)?;
             for (n, seen) in r.states.iter().zip(&r.values) {
                 let values = match found.entry((name, *n)) {
                     Entry::Occupied(held) => held.into_mut(),
                     Entry::Vacant(free) => free.insert(rollout.observable_value(name, *n)?),
                 };
-                let off = observable(name)?.miss(values[r.entry], *seen);
+                let off = seen_as.miss(values[r.entry], *seen);
                 out.push(off / r.deviation);
             }
         }

@@ -152,8 +152,8 @@ pub(super) fn solve(
     watch.lap(&mut times.derivatives);
     let mut regularisation = settings.regularisation;
     let mut costs = vec![run.cost];
-    // Steps that were refused since the last that wasn't.
-    let (mut iterations, mut fresh, mut refused) = (0, true, 0);
+    // Whether the model is this trajectory's, and whether all steps from here were refused so far.
+    let (mut iterations, mut fresh, mut refused) = (0, true, false);
     let grow = |mu: f64| (mu * GROWTH).max(LEAST);
     let mut answers;
     let stop = loop {
@@ -180,11 +180,11 @@ pub(super) fn solve(
         let least = settings.tolerance.max(ROUNDING) * size;
         if expected <= least {
             // Heavy regularisation makes any step small: what there is to gain tells a sweep without.
-            let plain = backward(&model.knots, &model.last, 0.0);
-            if regularisation == 0.0 || plain.is_some_and(|plain| plain.fall() <= least) {
+            let plain = || backward(&model.knots, &model.last, 0.0);
+            if regularisation == 0.0 || plain().is_some_and(|plain| plain.fall() <= least) {
                 break IlqrStop::Stationary;
             }
-            if refused > 0 {
+            if refused {
                 break IlqrStop::Stuck;
             }
         }
@@ -201,7 +201,7 @@ pub(super) fn solve(
         let (part, fell) = match found {
             Some((part, next)) => {
                 let fell = run.cost - next.cost;
-                (run, fresh, refused) = (next, false, 0);
+                (run, fresh, refused) = (next, false, false);
                 regularisation /= GROWTH;
                 if regularisation < LEAST {
                     regularisation = 0.0;
@@ -210,7 +210,7 @@ pub(super) fn solve(
             }
             None => {
                 regularisation = grow(regularisation);
-                refused += 1;
+                refused = true;
                 (0.0, f64::INFINITY)
             }
         };

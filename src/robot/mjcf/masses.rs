@@ -63,12 +63,10 @@ impl Made<'_> {
             InertiaSpec::Diagonal([x, y, z]) => [x, y, z, 0.0, 0.0, 0.0],
             InertiaSpec::Full(six) => six,
         };
-        self.check(of, "mass", &[given.mass])?;
         if given.mass < 0.0 {
             let remedy = "give zero (a massless link) or more, in kg";
             return Err(self.wrong(&format!("{of}: mass"), given.mass, remedy));
         }
-        self.check(of, "inertia", &six)?;
         let [xx, yy, zz, xy, xz, yz] = six;
         let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let turn = at.rotation.to_rotation_matrix();

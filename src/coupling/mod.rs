@@ -98,6 +98,11 @@ pub trait Coupling: Send + Sync {
         0
     }
 
+    /// Takes for each body what its added mass is given to have more than it has alone in the water (as [`Given::new`]), where it can by itself; false of a coupling that [`Given`] is to carry.
+    fn give(&mut self, _change: &[Mat6]) -> bool {
+        false
+    }
+
     /// What normal velocities left between the collocation points are worth: the change of
     /// `basisᵀ M̄_f basis` that they ask for, symmetric. `None` where there are no such points.
     ///

@@ -26,6 +26,7 @@ use crate::geometry::{Beneath, Image};
 use crate::solver::Columns;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// How all bodies in the water move at one moment.
@@ -214,10 +215,12 @@ pub(super) fn on_surfaces(
     seen: &[Seen],
     held: Option<Held>,
 ) -> Vec<SurfacePotential> {
+    let mut seen_by: Vec<Vec<&Seen>> = surfaces.iter().map(|_| Vec::new()).collect();
+    seen.iter().for_each(|seen| seen_by[seen.target].push(seen));
     let of = |(b, surface): (usize, &Arc<PanelBoundary>)| {
         let centres = &surface.faces.centres;
         let mut incident = Columns::zeros(centres.len(), 2);
-        for seen in seen.iter().filter(|s| s.target == b) {
+        for seen in &seen_by[b] {
             let source = &charges[seen.source];
             add(motion, centres, (seen, source), held, &mut incident);
         }
@@ -228,7 +231,8 @@ pub(super) fn on_surfaces(
         ];
         SurfacePotential::of(&surface.total_potential(&twists, &incident))
     };
-    let mut out: Vec<SurfacePotential> = surfaces.iter().enumerate().map(of).collect();
+    let each = surfaces.par_iter().enumerate().map(of);
+    let mut out: Vec<SurfacePotential> = each.collect();
     if let Some(held) = held {
         held.add_water(motion, surfaces, &mut out);
     }

@@ -1,6 +1,7 @@
 //! The mass matrix M(q) = M_r + ρ Jᵀ M̄_f J: its products, itself, and its factor.
 
 use super::fluid::{self, FluidMomenta};
+use super::island_matrix::IslandMatrix;
 use super::recoil::Recoiling;
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
@@ -17,12 +18,18 @@ const LEAST: f64 = 1e-13;
 /// The rows and columns of the mass matrix that forces decide, factored. Right-hand sides and solutions have an entry per velocity; those of driven ones aren't read,
 /// and zero.
 pub enum Inertia<'a> {
-    /// The matrix, and the velocities that are free.
-    Dense(Definite, Vec<usize>),
-    /// Where no body feels another.
-    Articulated(Articulated),
+    /// Where it is formed, or no body feels another.
+    Factored(Factor),
     /// Where so many do that no matrix is formed.
     Recoiling(Recoiling<'a>),
+}
+
+/// A factored inertia.
+pub enum Factor {
+    /// By the trees of joints.
+    Trees(Articulated),
+    /// Of sets of free velocities that feel each other.
+    Blocks(Vec<(Vec<usize>, Definite)>),
 }
 
 impl<'a> Evaluation<'a> {
@@ -95,19 +102,12 @@ impl<'a> Evaluation<'a> {
             FluidMomenta::Apart(added) => Some(*added),
             FluidMomenta::Still => None,
             FluidMomenta::Scattered(at) => {
-                if self.system.tree.has_followers() {
-                    return self.factored_dense(free);
-                }
-                let own = self.articulated(free, Some(at.own()))?;
+                let own = self.factored_apart(free, Some(at.own()))?;
                 let own = Box::new(move |right: &DVector<f64>| own.solve(right));
                 return Ok(Inertia::Recoiling(Recoiling::new(self, at, own)));
             }
         };
-        // Closed by a transmission, a tree isn't one any more.
-        if self.system.tree.has_followers() {
-            return self.factored_dense(free);
-        }
-        self.articulated(free, added).map(Inertia::Articulated)
+        self.factored_apart(free, added).map(Inertia::Factored)
     }
 
     /// v with given velocities `driven` (zero where free) and the rows `free` of M v = `right`.
@@ -167,7 +167,27 @@ impl<'a> Evaluation<'a> {
         out
     }
 
-    /// The factor of bodies that don't feel each other.
+    /// The factor of bodies that don't feel each other: by their trees; closed by a transmission, a tree isn't one any more.
+    fn factored_apart(&self, free: &[usize], added: Option<&[Mat6]>) -> Result<Factor> {
+        if !self.system.tree.has_followers() {
+            return self.articulated(free, added).map(Factor::Trees);
+        }
+        let islands = self.jointed_islands();
+        let changes = islands.changes();
+        let products: Vec<_> = changes.iter().map(|v| self.mass_alone_times(v)).collect();
+        let mass = IslandMatrix::new(islands, &products).symmetric();
+        let mut factors = Vec::new();
+        for (rows, block) in mass.free_blocks(free) {
+            let rows: Vec<usize> = rows.iter().map(|row| free[*row]).collect();
+            let factor = definite(block).map_err(|found| {
+                let smallest = found.smallest;
+                unresolved(self.at_joint(found.weakest.map(|k| rows[k])), smallest)
+            })?;
+            factors.push((rows, factor));
+        }
+        Ok(Factor::Blocks(factors))
+    }
+
     fn articulated(&self, free: &[usize], added: Option<&[Mat6]>) -> Result<Articulated> {
         let mut inertias = self.rigid.clone();
         if let Some(added) = added {
@@ -194,25 +214,22 @@ impl<'a> Evaluation<'a> {
         self.mass_matrix();
         self.check()?;
         let block = self.mass_matrix().select_rows(free).select_columns(free);
-        let refused = |smallest| unresolved(self.weakest(free), smallest);
-        if !is_scaled_above(&block, LEAST) {
-            let smallest = smallest_scaled_eigenvalue(&block);
-            if smallest.is_nan() || smallest <= LEAST {
-                return Err(refused(smallest));
+        match definite(block) {
+            Ok(factor) => {
+                let all = vec![(free.to_vec(), factor)];
+                Ok(Inertia::Factored(Factor::Blocks(all)))
             }
-        }
-        match Definite::new(block.clone()) {
-            Some(factor) => Ok(Inertia::Dense(factor, free.to_vec())),
-            None => Err(refused(smallest_scaled_eigenvalue(&block))),
+            Err(found) => {
+                let weakest = found.weakest.map(|k| free[k]);
+                Err(unresolved(self.at_joint(weakest), found.smallest))
+            }
         }
     }
 
-    /// Where the velocities `free` have least inertia, in words.
-    fn weakest(&self, free: &[usize]) -> String {
-        let block = self.mass_matrix().select_rows(free).select_columns(free);
-        let least = least_direction(&block).and_then(|x| free.get(x.icamax()).copied());
+    /// Where a velocity is that has least inertia, in words.
+    fn at_joint(&self, velocity: Option<usize>) -> String {
         let mut links = self.system.tree.links().iter().zip(&self.system.bodies);
-        match least.and_then(|i| links.find(|(link, _)| link.v.contains(&i))) {
+        match velocity.and_then(|i| links.find(|(link, _)| link.v.contains(&i))) {
             Some((_, body)) => format!(
                 "mass matrix M(q), most at the joint of body {:?}",
                 body.name
@@ -230,6 +247,30 @@ impl<'a> Evaluation<'a> {
             *wrench = rho * *wrench - self.rigid_momentum(b, system.drift.of(b));
         }
         out
+    }
+}
+
+/// A matrix that isn't positive definite: its smallest eigenvalue, the diagonal scaled to one, and the entry that the eigenvector has most of.
+struct Refused {
+    smallest: f64,
+    weakest: Option<usize>,
+}
+
+/// The factor of a symmetric matrix.
+fn definite(block: DMatrix<f64>) -> std::result::Result<Definite, Refused> {
+    let refused = |block: &DMatrix<f64>, smallest: f64| Refused {
+        smallest,
+        weakest: least_direction(block).map(|x| x.icamax()),
+    };
+    if !is_scaled_above(&block, LEAST) {
+        let smallest = smallest_scaled_eigenvalue(&block);
+        if smallest.is_nan() || smallest <= LEAST {
+            return Err(refused(&block, smallest));
+        }
+    }
+    match Definite::new(block.clone()) {
+        Some(factor) => Ok(factor),
+        None => Err(refused(&block, smallest_scaled_eigenvalue(&block))),
     }
 }
 
@@ -261,39 +302,56 @@ fn unresolved(place: String, smallest: f64) -> Error {
     }
 }
 
-impl Inertia<'_> {
-    /// v with M v = `right` on the free rows.
-    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+impl Factor {
+    fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         match self {
-            Self::Articulated(tree) => tree.solve(right),
-            Self::Recoiling(many) => many.solve(right),
-            Self::Dense(factor, free) => {
-                let found = factor.solve(&right.select_rows(free));
+            Self::Trees(tree) => tree.solve(right),
+            Self::Blocks(all) => {
                 let mut out = DVector::zeros(right.len());
-                for (x, i) in found.iter().zip(free) {
-                    out[*i] = *x;
+                for (velocities, factor) in all {
+                    let found = factor.solve(&right.select_rows(velocities));
+                    let each = velocities.iter().zip(found.iter());
+                    each.for_each(|(i, x)| out[*i] = *x);
                 }
                 out
             }
         }
     }
 
+    fn solve_columns(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        match self {
+            Self::Trees(tree) => tree.solve_columns(right),
+            Self::Blocks(all) => {
+                let mut out = DMatrix::zeros(right.nrows(), right.ncols());
+                for (velocities, factor) in all {
+                    let found = factor.solve_columns(&right.select_rows(velocities));
+                    for (i, x) in velocities.iter().zip(found.row_iter()) {
+                        out.row_mut(*i).copy_from(&x);
+                    }
+                }
+                out
+            }
+        }
+    }
+}
+
+impl Inertia<'_> {
+    /// v with M v = `right` on the free rows.
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Factored(factor) => factor.solve(right),
+            Self::Recoiling(many) => many.solve(right),
+        }
+    }
+
     /// The same of every column.
     pub fn solve_columns(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         match self {
-            Self::Articulated(tree) => tree.solve_columns(right),
+            Self::Factored(factor) => factor.solve_columns(right),
             Self::Recoiling(many) => {
                 let mut out = right.clone();
                 for (mut out, right) in out.column_iter_mut().zip(right.column_iter()) {
                     out.copy_from(&many.solve(&right.into_owned()));
-                }
-                out
-            }
-            Self::Dense(factor, free) => {
-                let found = factor.solve_columns(&right.select_rows(free));
-                let mut out = DMatrix::zeros(right.nrows(), right.ncols());
-                for (x, i) in found.row_iter().zip(free) {
-                    out.row_mut(*i).copy_from(&x);
                 }
                 out
             }

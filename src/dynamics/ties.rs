@@ -24,6 +24,11 @@ impl Evaluation<'_> {
         }
     }
 
+    /// The same of joints alone.
+    pub(super) fn jointed_islands(&self) -> Islands {
+        self.tied(Some(Vec::new()))
+    }
+
     /// The same of the dampers that are solved with contact alone.
     pub(super) fn damped_islands(&self) -> Islands {
         self.tied(self.system.dampers().map(|f| f.ties()).collect())

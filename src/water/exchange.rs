@@ -1,6 +1,6 @@
 //! How what bodies exchange with each other is computed: by a factor of all of it, or by products alone.
 
-use crate::scene::{Body, Scene};
+use crate::scene::Scene;
 
 /// Bodies from which on products alone are faster (`cargo bench --bench bodies`).
 const MANY: usize = 24;
@@ -14,7 +14,7 @@ pub(super) fn faster(bodies: usize, walls: usize) -> bool {
 choices! {
     /// How compressed bodies are coupled.
     pub enum Exchange {
-        /// By products from 24 bodies on, twice as many with each wall, where the scene takes them. Flow, pressure and sensors aren't told then.
+        /// By products from 24 bodies on, twice as many with each wall; by the factor where shapes are parameters.
         #[default]
         Auto,
         /// By a factor of the whole exchange, cubic in the number of bodies.
@@ -25,14 +25,12 @@ choices! {
 }
 
 impl Exchange {
-    /// Whether it will surely be by products as far as the scene tells: for what a scene takes.
+    /// Whether it will surely be by products as far as the scene tells.
     pub(crate) fn expected(self, scene: &Scene) -> bool {
-        let plain = |b: &Body| b.mimic.is_none() && b.added_mass.is_none();
-        let takes = scene.bodies.iter().all(plain);
         match self {
             Exchange::Factor => false,
-            Exchange::Products => takes,
-            Exchange::Auto => takes && faster(scene.bodies.len(), scene.walls.len()),
+            Exchange::Products => true,
+            Exchange::Auto => faster(scene.bodies.len(), scene.walls.len()),
         }
     }
 }

@@ -151,7 +151,7 @@ pub(crate) fn prepare(
     let mut reasons = planned.reasons;
     if problem.products {
         reasons.push(format!(
-            "{} bodies are coupled by products alone: flow, pressure and sensors aren't told (setting exchange)",
+            "{} bodies are coupled by products alone (setting exchange)",
             numbers.len()
         ));
     }

@@ -15,20 +15,13 @@ use std::sync::Arc;
 /// # Errors
 /// [`Error::Unsupported`] where they were asked for and something doesn't take them.
 pub(super) fn by_products(exchange: Exchange, problem: &Problem) -> Result<bool> {
-    let given = problem.bodies.iter().any(|b| b.added_mass.is_some());
-    let without = [
-        (given, "given added masses"),
-        (!problem.changes.is_empty(), "shape parameters"),
-        (problem.mimics, "joints that follow others"),
-    ];
-    let refused = without.into_iter().find(|(there, _)| *there);
-    match (exchange, refused) {
-        (Exchange::Factor, _) | (Exchange::Auto, Some(_)) => Ok(false),
-        (Exchange::Auto, None) => Ok(faster(problem.bodies.len(), problem.walls.len())),
-        (Exchange::Products, None) => Ok(true),
-        (Exchange::Products, Some((_, what))) => Err(Error::Unsupported {
-            what: format!("exchange by products with {what}"),
-            why: "it isn't there yet".into(),
+    match (exchange, problem.changes.is_empty()) {
+        (Exchange::Factor, _) | (Exchange::Auto, false) => Ok(false),
+        (Exchange::Auto, true) => Ok(faster(problem.bodies.len(), problem.walls.len())),
+        (Exchange::Products, true) => Ok(true),
+        (Exchange::Products, false) => Err(Error::Unsupported {
+            what: "exchange by products with shape parameters".into(),
+            why: "what a shape changes is known of the factor alone".into(),
             instead: "leave the setting exchange to auto, or use factor".into(),
         }),
     }

@@ -223,6 +223,22 @@ pub(super) fn scattering_systems() -> Vec<Scattering> {
     out
 }
 
+/// Two bodies by products over a floor and beside a free surface, who feel each other by their images alone.
+pub(super) fn scattering_between_walls() -> Scattering {
+    let bodies = reduced_systems()[0].reduced_bodies().to_vec();
+    let free = Wall {
+        surface: WallSurface::Free,
+        ..SIDE
+    };
+    let (images, levels) = (
+        Image::of_walls(&[WALL, free]).unwrap(),
+        Levels::for_accuracy(1e-3).unwrap(),
+    );
+    let names = vec!["a".to_string(), "b".to_string()];
+    let made = Scattering::between(bodies, names, &poses(), images, levels).unwrap();
+    made.excluding(&Exclusions::new([(0, 1)])).unwrap()
+}
+
 /// Panels that come nearer than they resolve: to one another and to a wall, round ones and with edges, on one mesh and on two, by blocks and by the whole matrix.
 /// The film is there: it is what they differ by from those without.
 pub(super) fn filmed_panels() -> Vec<FilmedPanels> {

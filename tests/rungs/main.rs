@@ -158,8 +158,8 @@ const THROUGH: &[(&str, &str)] = &[
         "coupling::reduced::linearised::Reduced::surface_potentials_vjp",
     ),
     (
+        "coupling::scattering::surface::Scattering::potentials_vjp",
         "coupling::scattering::linearised::Scattering::surface_potentials_vjp",
-        "coupling::isolated::Isolated::surface_potentials_vjp",
     ),
     // The sums of many bodies, in numbers and in dual numbers.
     (

@@ -2,7 +2,7 @@
 
 use super::coupling::{
     displaced, extrapolated_panels, field, filmed_panels, given_systems, isolated, panel_systems,
-    panels, poses, reduced_systems, systems,
+    panels, poses, reduced_systems, scattering_between_walls, scattering_systems, systems,
 };
 use super::tools::{Group, all, groups, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
@@ -20,6 +20,7 @@ pub fn rungs() -> Vec<Rung> {
         "coupling::panel::PanelCoupled::surface_potentials_vjp" => |c| all(panel_systems().iter().map(|s| vjp(s, c))),
         "coupling::panel::extrapolated::ExtrapolatedPanels::surface_potentials_vjp" => |c| vjp(&extrapolated_panels(), c),
         "coupling::reduced::linearised::Reduced::surface_potentials_vjp" => |c| all(reduced_systems().iter().map(|s| vjp(s, c))),
+        "coupling::scattering::linearised::Scattering::surface_potentials_vjp" => |c| all(scattering_systems()[..3].iter().chain(&[scattering_between_walls()]).map(|s| vjp(s, c))),
         "coupling::full::Full::surface_potentials_vjp" => |c| all(systems().iter().map(|s| vjp(s, c))),
         "coupling::given::Given::surface_potentials_vjp" => |c| vjp(&given_systems()[0], c),
     ]

@@ -25,6 +25,7 @@ mod reduced;
 mod refine;
 mod scattering;
 mod scattering_films;
+mod scattering_scenes;
 mod sensors;
 mod several_pieces;
 mod shape_slopes;

@@ -621,20 +621,6 @@ fn what_rests_and_what_turns_back_is_solved() {
 
 #[test]
 fn what_isnt_there_is_refused_by_name() {
-    let mut scene = swarm(2, 1.0, 1200.0);
-    let given =
-        DMatrix::from_diagonal(&DVector::from_column_slice(&[3.0, 3.0, 3.0, 0.1, 0.1, 0.1]));
-    scene.bodies[0].added_mass = Some(
-        given
-            .row_iter()
-            .map(|r| r.iter().copied().collect())
-            .collect(),
-    );
-    let refused = Simulator::new(&scene, settings(Exchange::Products, Integrator::Rk2));
-    says(
-        refusal(refused),
-        &["given added masses", "exchange", "factor"],
-    );
     let poses = vec![Pose::identity()];
     let kinds = kinds(0.03);
     let levels = Levels::for_accuracy(0.01).unwrap();

@@ -4,8 +4,9 @@ use super::Scattering;
 use super::answers::Recoiled;
 use super::kept::Answer;
 use super::scattered::{Motions, Moving, Scattered, balance, mixed, plus};
-use crate::adjoint::lie::{Pose, Vec6};
+use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::boundary::PanelBoundary;
+use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::{
     Carried, Coupling, CouplingReport, Direction, Linearised, Momenta, Motion, MotionBar, Pullback,
@@ -16,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// Columns of a dense basis.
-struct Dense(DMatrix<f64>);
+pub(super) struct Dense(pub DMatrix<f64>);
 
 impl Motions for Dense {
     fn twists(&self, coefficients: &DVector<f64>) -> DVector<f64> {
@@ -165,7 +166,7 @@ impl<'a> ScatteredLinearised<'a> {
     /// The rates of charges as bodies are displaced.
     fn rates(&self, moving: &Moving, charges: &[f64]) -> Vec<f64> {
         let at = &self.at;
-        at.answering(&at.tangent_potentials(moving, charges))
+        at.answered(&at.tangent_potentials(moving, charges)).0
     }
 
     /// The rate of the impulses of an answer as bodies are displaced.
@@ -173,7 +174,7 @@ impl<'a> ScatteredLinearised<'a> {
         let at = &self.at;
         let moving = at.moving(z);
         let seen = at.tangent_potentials(&moving, &answer.charges);
-        let mut out = at.impulses_answered(&seen);
+        let (_, mut out) = at.answered(&seen);
         moving.narrow.add_impulse_rate(&answer.twists, &mut out);
         out
     }
@@ -281,14 +282,6 @@ impl Linearised for ScatteredLinearised<'_> {
     }
 }
 
-fn untold(what: &str) -> Error {
-    Error::Unsupported {
-        what: format!("{what} with many bodies coupled by products"),
-        why: "they tell impulses and wrenches alone".into(),
-        instead: "set exchange to factor".into(),
-    }
-}
-
 impl Coupling for Scattering {
     fn name(&self) -> &'static str {
         "the fidelity reduced, for many bodies"
@@ -315,25 +308,32 @@ impl Coupling for Scattering {
         Some(self)
     }
 
+    fn give(&mut self, change: &[Mat6]) -> bool {
+        let own = self.bodies.iter().zip(change);
+        let own = own.map(|(body, change)| body.parts().added_mass + change);
+        self.alone = Isolated::new(own.collect());
+        true
+    }
+
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
         Ok(Some(self.films.momenta(poses, twists, &self.names)?))
     }
 
     fn surface_potentials(
         &self,
-        _motion: &Motion,
-        _surfaces: &[Arc<PanelBoundary>],
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
-        Err(untold("the flow on surfaces and at points"))
+        self.potentials(motion, surfaces)
     }
 
     fn surface_potentials_vjp(
         &self,
-        _motion: &Motion,
-        _surfaces: &[Arc<PanelBoundary>],
-        _bars: &[SurfacePotential],
+        motion: &Motion,
+        surfaces: &[Arc<PanelBoundary>],
+        bars: &[SurfacePotential],
     ) -> Result<MotionBar> {
-        Err(untold("the derivative of the flow"))
+        self.potentials_vjp(motion, surfaces, bars)
     }
 }
 

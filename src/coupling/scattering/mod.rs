@@ -39,6 +39,7 @@ mod places;
 mod scattered;
 mod spare;
 mod sums;
+mod surface;
 
 pub use answers::{Goal, Recoiled};
 pub use elsewhere::{Changed, Summing, SummingAt};
@@ -67,7 +68,7 @@ use std::sync::Arc;
 pub struct Scattering {
     bodies: Vec<Arc<ReducedBody>>,
     names: Vec<String>,
-    /// The same where they don't feel each other, by M̄₀ of each.
+    /// The same where they don't feel each other, by M̄₀ of each: its own, or what is given in its place.
     alone: Isolated,
     /// Those that walls make, none being the first.
     images: Vec<Image>,
@@ -227,7 +228,7 @@ impl Scattering {
         &self.bodies
     }
 
-    /// The added mass of each body alone, at unit density (body frame, about its origin).
+    /// The added mass of each body alone, at unit density (body frame, about its origin), with what is given in its place.
     pub fn own(&self) -> &[Mat6] {
         self.alone.added_masses()
     }

@@ -107,6 +107,11 @@ impl Gap {
 }
 
 impl<'a> Narrow<'a> {
+    /// What holds bodies apart.
+    pub fn films(&self) -> &PlacedFilms {
+        &self.films
+    }
+
     /// Whether there is any.
     pub fn any(&self) -> bool {
         !self.gaps.is_empty()
@@ -218,7 +223,12 @@ impl<'a> Narrow<'a> {
     }
 }
 
-impl MovingNarrow<'_> {
+impl<'n> MovingNarrow<'n> {
+    /// What holds bodies apart.
+    pub fn films(&self) -> &MovingFilms<'n> {
+        &self.films
+    }
+
     fn holding(&self, sign: f64) -> &MovingFilms<'_> {
         if sign > 0.0 { &self.films } else { &self.still }
     }

@@ -338,16 +338,12 @@ impl Scattered<'_> {
         self.charges(twists, &self.scattered(&right).x)
     }
 
-    /// Charges that bodies that stand still answer potentials with, L a, a = Lᵀ(ψ + Ĝ L a).
-    pub(super) fn answering(&self, potentials: &[f64]) -> Vec<f64> {
+    /// Charges that bodies that stand still answer potentials with, α = L a, a = Lᵀ(ψ + Ĝ L a), and the impulses 4π Ūᵀ(ψ + Ĝ α).
+    pub(super) fn answered(&self, potentials: &[f64]) -> (Vec<f64>, DVector<f64>) {
         let still = DVector::zeros(6 * self.model.bodies.len());
-        self.charges(&still, &self.scattered(&self.projected(potentials).0).x)
-    }
-
-    /// 4π Ūᵀ(ψ + Ĝ α), α those charges.
-    pub(super) fn impulses_answered(&self, potentials: &[f64]) -> DVector<f64> {
         let (right, impulses) = self.projected(potentials);
-        impulses + self.scattered(&right).impulses
+        let found = self.scattered(&right);
+        (self.charges(&still, &found.x), impulses + found.impulses)
     }
 
     /// 4π Ūᵀ ψ.

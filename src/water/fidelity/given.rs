@@ -31,6 +31,9 @@ pub(super) fn put(problem: &Problem, mut made: Made) -> Result<Made> {
         // Nothing is known of what is given.
         made.bodies[b].added_mass_error = None;
     }
+    if made.coupling.give(&change) {
+        return Ok(made);
+    }
     let given = |b: usize| problem.bodies[b].added_mass.is_some();
     let rates = made.own_rates.iter();
     let rates = rates.map(|&(b, rate)| (b, if given(b) { rate } else { Mat6::zeros() }));

@@ -122,8 +122,6 @@ pub(crate) struct Problem<'a> {
     pub plan: &'a Plan,
     /// Where the bodies start.
     pub start: &'a [Pose],
-    /// Whether joints follow others.
-    pub mimics: bool,
     /// Whether they are coupled by products alone.
     pub products: bool,
     /// Where compressed bodies are kept.
@@ -152,7 +150,6 @@ impl<'a> Problem<'a> {
             numerics,
             plan: &NO_PLAN,
             start: &[],
-            mimics: scene.bodies.iter().any(|b| b.mimic.is_some()),
             products: false,
             folder: None,
             changes: &[],

@@ -3,7 +3,7 @@
 use clap::Args;
 use std::path::PathBuf;
 
-use super::options::rate;
+use super::options::{length, rate};
 use crate::Result;
 use crate::output::{Frames, gltf, vtk};
 use crate::simulate::{Recording, Rollout, StreamlineSettings};
@@ -27,6 +27,7 @@ pub(super) struct Export {
     #[arg(
         long,
         value_name = "M",
+        value_parser = length,
         requires = "vtk_seed",
         default_value = "1",
         allow_negative_numbers = true

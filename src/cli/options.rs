@@ -259,7 +259,8 @@ fn number(text: &str, below: f64, expected: &str) -> std::result::Result<f64, St
     found.ok_or_else(|| expected.into())
 }
 
-fn length(text: &str) -> std::result::Result<f64, String> {
+/// A length above zero.
+pub(super) fn length(text: &str) -> std::result::Result<f64, String> {
     number(text, f64::INFINITY, "give a length above zero, in m")
 }
 

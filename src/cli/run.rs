@@ -119,7 +119,7 @@ pub(super) struct RunReport {
     pub min_gap: Option<f64>,
     /// By what the water across gaps is carried, and its estimated errors: at the smallest gap, and where that of the force is largest; when films came and went.
     pub gaps: GapEstimates,
-    /// What the smallest gap is worth, with `--check-gap`; null without, and where there is nothing to compare.
+    /// What the smallest gap is worth, with `--check-gap`; null without, where there is nothing to compare, and where that fails, which a warning says.
     pub gap_check: Option<GapReport>,
     /// Which of inertia and viscosity rules the water in the smallest gap; null where there is none.
     pub gap_flow: Option<GapFlow>,
@@ -134,6 +134,29 @@ pub(super) struct RunReport {
     pub warnings: Vec<String>,
     /// What was written.
     pub files: Vec<PathBuf>,
+}
+
+impl RunReport {
+    /// Adds what is asked of the smallest gap once the run is done. A failure says nothing of the run: it is a warning.
+    fn look_at_gap(&mut self, rollout: &Rollout, check: bool) {
+        if check {
+            match rollout.check_gap() {
+                Ok(found) => self.gap_check = found.map(GapReport::from),
+                Err(error) => {
+                    let warning = format!("--check-gap: the smallest gap isn't checked: {error}");
+                    self.warnings.push(warning);
+                }
+            }
+        }
+        match rollout.gap_flow() {
+            Ok(found) => self.gap_flow = found,
+            Err(error) => {
+                let warning =
+                    format!("what rules the water in the smallest gap isn't known: {error}");
+                self.warnings.push(warning);
+            }
+        }
+    }
 }
 
 pub(super) fn main(
@@ -180,6 +203,10 @@ pub(super) fn main(
         // Why the run ended is said besides.
         Err(error) if halted.is_some() => output.error(&error),
         Err(error) => return Err(error),
+    }
+    // After what is kept, which neither a failure nor Ctrl-C may cost: it takes long.
+    if halted.is_none() {
+        report.look_at_gap(&rollout, arguments.check_gap);
     }
     match arguments.record(videos, rollout) {
         Ok(files) => report.files.extend(files),
@@ -276,10 +303,6 @@ fn simulate(
         },
     };
     let seconds = start.elapsed().as_secs_f64();
-    let gap_check = match arguments.check_gap && halted.is_none() {
-        true => rollout.check_gap()?.map(GapReport::from),
-        false => None,
-    };
     let summary = rollout.summary();
     let last = &rollout.samples()[rollout.steps()];
     let report = RunReport {
@@ -302,8 +325,8 @@ fn simulate(
         momenta_kept: summary.momenta_kept,
         min_gap: summary.min_gap,
         gaps: summary.gaps,
-        gap_check,
-        gap_flow: rollout.gap_flow()?,
+        gap_check: None,
+        gap_flow: None,
         contact_gap: summary.contact_gap,
         cut_steps: summary.cut_steps,
         most_pieces: summary.most_pieces,

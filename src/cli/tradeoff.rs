@@ -116,14 +116,20 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
         ControlFlow::Continue(())
     })?;
     drop(bar);
-    let mut files = Vec::new();
+    let (mut files, mut lost) = (Vec::new(), None);
     if let Some(file) = &arguments.plot {
-        plot::write(file, &found)?;
-        files.push(file.clone());
+        match plot::write(file, &found) {
+            Ok(()) => files.push(file.clone()),
+            Err(error) => lost = Some(error),
+        }
     }
     let measured = found.rows.iter().any(|r| r.added_mass_rel_error.is_some());
     output.result(&TradeoffReport::new(found, files));
-    Ok(match measured {
+    // What took the time is said all the same.
+    if let Some(error) = &lost {
+        output.error_for_people(error);
+    }
+    Ok(match measured && lost.is_none() {
         true => Exit::Done,
         false => Exit::Failed,
     })

@@ -1,5 +1,6 @@
 //! Bodies that don't feel each other: each keeps its own constant added mass (Eq. 12).
 
+use super::settings::check_asked;
 use super::surface::{check, on_surfaces};
 use super::surface_back::{Back, onto_charges};
 use super::{
@@ -72,7 +73,8 @@ impl Coupling for Isolated {
         0
     }
 
-    fn evaluate(&self, _poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+    fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        check_asked(self, poses, basis)?;
         Ok(Momenta::new(
             self.impulses(basis),
             CouplingReport::default(),

@@ -65,7 +65,7 @@ pub trait Coupling: Send + Sync {
     /// M̄_f applied to the columns of `basis` (6·bodies × k, body-frame twists) at the given poses.
     ///
     /// # Errors
-    /// A solve that misses its tolerance, bodies that overlap, or a gap that isn't resolved.
+    /// [`Error::Input`] for other numbers of poses and rows than the bodies have; a solve that misses its tolerance, bodies that overlap, or a gap that isn't resolved.
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta>;
 
     /// The same fidelity with its derivatives, if it has any.

@@ -1,6 +1,8 @@
-//! What the coupled systems share: ranges of their bodies, limits of their solvers, and the measure of
-//! their symmetry.
+//! What the coupled systems share: ranges of their bodies, what may be asked of them, limits of their
+//! solvers, and the measure of their symmetry.
 
+use super::Coupling;
+use crate::adjoint::lie::Pose;
 use crate::solver::Outcome;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
@@ -19,6 +21,23 @@ pub(super) fn ranges(lengths: impl Iterator<Item = usize>) -> Vec<Range<usize>> 
 /// Where consecutive ranges end.
 pub(super) fn end(ranges: &[Range<usize>]) -> usize {
     ranges.last().map_or(0, |r| r.end)
+}
+
+/// Refuses poses and columns of twists that aren't those of the coupling's bodies.
+pub(super) fn check_asked(
+    coupling: &dyn Coupling,
+    poses: &[Pose],
+    twists: &DMatrix<f64>,
+) -> Result<()> {
+    let bodies = coupling.bodies();
+    if poses.len() == bodies && twists.nrows() == 6 * bodies {
+        return Ok(());
+    }
+    Err(Error::input(
+        format!("{}: poses and basis", coupling.name()),
+        format!("{} poses, {} rows", poses.len(), twists.nrows()),
+        format!("must be one pose and six rows for each of the {bodies} bodies"),
+    ))
 }
 
 /// Whether a residual meets the tolerance; that of a recurrence may stall a little above at round-off.

@@ -74,7 +74,7 @@ impl Image {
         Ok(out)
     }
 
-    /// As [`Image::of_walls`], for a fidelity that knows no free surface.
+    /// As [`Image::of_walls`], for a fidelity, and its method, that know no free surface.
     ///
     /// # Errors
     /// As there, and a free surface.
@@ -82,9 +82,10 @@ impl Image {
         if let Some(w) = walls.iter().position(|w| w.surface == WallSurface::Free) {
             return Err(Error::Unsupported {
                 what: format!("the free surface walls[{w}] with {fidelity}"),
-                why: "its images have the opposite sign, which only the fidelity reduced has"
+                why: "its images have the opposite sign, which only the fidelity reduced and the method panel have"
                     .into(),
-                instead: "use the fidelity reduced or auto, or a rigid wall".into(),
+                instead: "use the fidelity reduced or auto, the method panel, or a rigid wall"
+                    .into(),
             });
         }
         Self::of_walls(walls)

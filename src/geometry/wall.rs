@@ -25,7 +25,7 @@ pub enum WallSurface {
     #[default]
     Rigid,
     /// Potential zero: a flat free surface in the limit of fast motion, without waves; images of the
-    /// opposite sign. With the fidelity `reduced` only.
+    /// opposite sign. With the fidelities `reduced` and `auto`, and with `full` by the method `panel`.
     Free,
 }
 

@@ -67,6 +67,25 @@ impl Simulator {
         Ok(())
     }
 
+    /// Checks the numbers of coordinates and velocity; messages call them `whose` q and v.
+    pub(crate) fn check_numbers(
+        &self,
+        whose: &str,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> Result<()> {
+        self.check_configuration(&format!("{whose} q"), q)?;
+        let n = self.system().tree.velocities();
+        if v.len() != n || v.iter().any(|x| !x.is_finite()) {
+            return Err(Error::input(
+                format!("{whose} v"),
+                format!("{:?}", v.as_slice()),
+                format!("must be {n} finite numbers"),
+            ));
+        }
+        Ok(())
+    }
+
     /// Checks coordinates and velocity after `step` steps; gives them with what motions say of driven joints.
     pub(super) fn check_start(
         &self,
@@ -74,15 +93,7 @@ impl Simulator {
         q: &DVector<f64>,
         v: &DVector<f64>,
     ) -> Result<(DVector<f64>, DVector<f64>)> {
-        self.check_configuration("initial q", q)?;
-        let n = self.system().tree.velocities();
-        if v.len() != n || v.iter().any(|x| !x.is_finite()) {
-            return Err(Error::input(
-                "initial v",
-                format!("{:?}", v.as_slice()),
-                format!("must be {n} finite numbers"),
-            ));
-        }
+        self.check_numbers("initial", q, v)?;
         let time = step as f64 * self.choices.time_step;
         let (driven_q, driven_v) = self.driven(q, v, time);
         let labels = [self.scene.coordinate_labels(), self.scene.velocity_labels()];
@@ -191,6 +202,23 @@ impl Simulator {
     /// [`Simulator::initial`].
     pub fn state(&self, step: usize, q: &DVector<f64>, v: &DVector<f64>) -> Result<State> {
         let (q, v) = self.check_start(step, q, v)?;
+        self.state_unchecked(step, &q, &v)
+    }
+
+    /// The same from what is seen of a plant whose clock isn't this one's: driven joints are where their motion has them after `step` steps, whatever `q` and `v` say of
+    /// them.
+    ///
+    /// # Errors
+    /// As [`Simulator::state`], but for driven joints.
+    #[cfg(feature = "opt")]
+    pub(crate) fn state_of_plant(
+        &self,
+        step: usize,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> Result<State> {
+        self.check_numbers("initial", q, v)?;
+        let (q, v) = self.driven(q, v, step as f64 * self.choices.time_step);
         self.state_unchecked(step, &q, &v)
     }
 }

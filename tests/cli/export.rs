@@ -494,4 +494,9 @@ fn the_program_writes_both() {
         let refused = [&run[..], &["--gltf", &file, "--frames-per-second", rate]].concat();
         fails(&refused, 2, &["--frames-per-second", "above zero"]);
     }
+    for length in ["0", "-1", "nan", "inf"] {
+        let lines = ["--vtk", &out, "--vtk-seed", "0,0,1", "--vtk-line-length"];
+        let refused = [&run[..], &lines, &[length]].concat();
+        fails(&refused, 2, &["--vtk-line-length", "above zero"]);
+    }
 }

@@ -1,6 +1,7 @@
 //! Added masses in the formats of other simulators, read back.
 
-use crate::support::command::text;
+use crate::support::command::{hydrograd, text};
+use crate::support::says;
 use hydrograd::adjoint::lie::Mat6;
 use hydrograd::{Fidelity, Scene, Settings, Simulator};
 
@@ -111,4 +112,22 @@ fn tables_and_objects_hold_all_digits() {
     let fin = &value["added_mass"]["fin"];
     let found = Mat6::from_fn(|i, j| fin[i][j].as_f64().unwrap());
     close(&found, &expected()[1], 1e-12);
+}
+
+/// Standard output holds one JSON object where that is asked for, and a format is none: refused on either side of the command.
+#[test]
+fn no_format_beside_json() {
+    let asked = ["added-mass", "--shape", "sphere:1", "--format", "fossen"];
+    for arguments in [
+        [&["--json"][..], &asked].concat(),
+        [&asked[..], &["--json"]].concat(),
+    ] {
+        let done = hydrograd(&arguments);
+        assert_eq!(done.status.code(), Some(2), "{arguments:?}");
+        let value: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        for message in [said.as_str(), value["error"].as_str().unwrap()] {
+            says(message, &["--format", "--json"]);
+        }
+    }
 }

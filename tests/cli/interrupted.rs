@@ -161,6 +161,50 @@ fn a_run_that_fails_in_a_step_keeps_what_ran() {
     fails(&arguments[..5], 1, &["nothing is kept without --out"]);
 }
 
+/// Two balls beside each other, and a body that panels can't take: its added mass is given without a shape.
+const UNSEEN: &str = r#"
+time_step = 0.01
+steps = 2
+fluid = { density = 998.0 }
+[[bodies]]
+name = "left"
+shape = { kind = "sphere", radius = 0.1, faces = 80 }
+density = 998.0
+[[bodies]]
+name = "right"
+shape = { kind = "sphere", radius = 0.1, faces = 80 }
+density = 998.0
+placement = { position = [0.25, 0.0, 0.0] }
+[[bodies]]
+name = "buoy"
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+added_mass = [
+    [0.001, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 0.001, 0.0, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 0.001, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 0.001, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.001, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.001],
+]
+placement = { position = [0.0, 2.0, 0.0] }
+"#;
+
+#[test]
+fn a_check_of_the_gap_that_fails_costs_nothing_of_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, out) = (folder.path().join("unseen.toml"), folder.path().join("out"));
+    std::fs::write(&scene, UNSEEN).unwrap();
+    let (scene, written) = (words(&scene), words(&out));
+    let run = ["run", &scene, "--fidelity", "isolated", "--check-gap"];
+    let report = json(&[&run[..], &["--out", &written]].concat());
+    assert!(report["gap_check"].is_null() && report["min_gap"].is_number());
+    let warnings = report["warnings"].to_string();
+    says(&warnings, &["--check-gap", "buoy", "no shape"]);
+    assert_eq!(report["files"].as_array().unwrap().len(), 2);
+    assert!(out.join("trajectory.json").is_file() && out.join("trajectory.csv").is_file());
+}
+
 /// What an interrupt leaves goes on to what would have been without it.
 #[cfg(unix)]
 #[test]

@@ -1,6 +1,8 @@
 //! `hydrograd tradeoff`.
 
 use crate::support::command::{self, hydrograd, scene};
+#[cfg(unix)]
+use crate::support::says;
 use serde_json::Value;
 
 fn json(arguments: &[&str]) -> Value {
@@ -261,7 +263,7 @@ shape = { kind = "sphere", radius = 0.05, faces = 80 }
 mass = 2.0
 "#;
 
-/// At rest in still water nothing accelerates: a force is made up, and end states don't exist.
+/// At rest in still water nothing accelerates: a force is made up, and end states don't exist. The budget may be longer than clocks count.
 #[test]
 fn a_scene_at_rest_is_compared_by_its_accelerations() {
     let folder = tempfile::tempdir().unwrap();
@@ -282,7 +284,10 @@ fn a_scene_at_rest_is_compared_by_its_accelerations() {
         "rk2",
         "--time-steps",
         "0.01",
+        "--budget",
+        "1e30",
     ]);
+    assert_eq!(report["budget"], 1e30);
     let said = &report["reference"]["acceleration"]["what"];
     assert!(said.as_str().unwrap().contains("pseudo-random force"));
     assert!(report["reference"]["end_state"].is_null());
@@ -304,6 +309,40 @@ fn a_scene_at_rest_is_compared_by_its_accelerations() {
     );
 }
 
+/// A picture that can't be written costs neither the measurements nor the one that was there.
+#[cfg(unix)]
+#[test]
+fn a_picture_that_is_lost_leaves_the_measurements() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, picture) = (
+        folder.path().join("still.toml"),
+        folder.path().join("still.svg"),
+    );
+    std::fs::write(&file, STILL).unwrap();
+    std::fs::write(&picture, "old").unwrap();
+    // No file may grow past a block of 512 bytes: writing fails as on a full disk.
+    let script = "trap '' XFSZ; ulimit -f 1; exec \"$@\"";
+    let done = std::process::Command::new("sh")
+        .args(["-c", script, "sh", env!("CARGO_BIN_EXE_hydrograd")])
+        .args(["tradeoff", &file.display().to_string(), "--json"])
+        .args(["--plot", &picture.display().to_string()])
+        .args(["--fidelities", "isolated", "--methods", "exact"])
+        .args(["--faces-list", "80", "--reference-faces", "320"])
+        .args(["--integrators", "rk2", "--time-steps", "0.01"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    says(&said, &["still.svg", "write failed"]);
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(report["files"], Value::Array(Vec::new()));
+    let row = rows(&report, "isolated", "exact")[0];
+    number(row, "added_mass_rel_error");
+    assert_eq!(std::fs::read_to_string(&picture).unwrap(), "old");
+    let left = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left, 2, "no temporary files stay behind");
+}
+
 #[test]
 fn wrong_usage_is_told() {
     let two = scene("two_spheres");
@@ -320,6 +359,13 @@ fn wrong_usage_is_told() {
     fails(&[&two, "--budget", "0"], 2, &["above zero, in s"]);
     fails(&[&two, "--steps", "0"], 2, &["above zero"]);
     fails(&[&two, "--plot", "two.png"], 1, &["two.png", ".svg"]);
+    // The folder is tried before anything is measured.
+    #[cfg(target_os = "linux")]
+    fails(
+        &[&two, "--plot", "/proc/two.svg"],
+        1,
+        &["/proc: write failed"],
+    );
     let folder = tempfile::tempdir().unwrap();
     let changed = |name: &str, from: &str, to: &str| {
         let file = folder.path().join(name);

@@ -401,6 +401,33 @@ fn bounds_are_no_ends() {
     }
 }
 
+/// A bound holds to the bit, and is said to, though 1 + (0.3 − 1) isn't 0.3.
+#[test]
+fn bounds_hold_to_the_bit() {
+    let mut scene = Scene::new(Fluid::none());
+    scene.time_step = 0.02;
+    let axis = [1.0, 0.0, 0.0];
+    let cart = Body::dry().named("cart").mass(1.0).inertia([0.1; 3]);
+    scene.add(cart.joint(Joint::Prismatic { axis }));
+    let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+    let controls = Controls::zeros(&simulator, 5);
+    let run = Experiment::new("rest", simulator, controls).saw(Recorded {
+        observable: "positions".into(),
+        entry: 0,
+        states: vec![5],
+        values: vec![0.1],
+        deviation: 1e-3,
+    });
+    let place = Unknown::new("place").sets_start("cart.position", 1.0);
+    let place = place.start(1.0).within(0.3, 2.0);
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let made = identify(&[run], &[place], &settings, go).unwrap();
+    let found = &made.unknowns[0];
+    assert!(found.at_bound && found.value == 0.3, "{made:?}");
+    assert_eq!(found.standard_error, 0.0);
+}
+
 /// A value of zero is known as well as any other, and a loss that forgives outliers says that the rest is noise.
 #[test]
 fn errors_have_no_scale() {
@@ -468,6 +495,24 @@ fn functions_are_held_to_their_word() {
         identify(&[scaled], &unknowns, &settings, go).unwrap_err(),
         &["hull.mass", "no unknown"],
     );
+}
+
+/// A scale of what isn't a parameter is refused: nothing would heed it.
+#[test]
+fn only_parameters_are_scaled() {
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let run = experiments(0.0, 11).swap_remove(0);
+    let run = run.scaled("mount.angle", -1.0);
+    let zero = Unknown::new("zero").sets_start("mount.angle", 1.0);
+    let both = [zero, Unknown::new(NAMES[0])];
+    let error = identify(&[run], &both, &settings, go).unwrap_err();
+    says(error, &["scale", "mount.angle", NAMES[0], "not starts"]);
+    let ball = [0.04, 0.04, 0.04, 0.0, 0.0, 0.0];
+    let name = "top.inertia.root.xx";
+    let run = tumbled(ball, ball, 0.0).scaled(name, 2.0);
+    let error = identify(&[run], &Unknown::inertia("top"), &settings, go).unwrap_err();
+    says(error, &["scale", name, "roots of inertias"]);
 }
 
 /// A residual alone, which the reverse sweep differentiates, and the same eight times over with as much less weight, which forward mode does: the same values and errors, 1e-9.

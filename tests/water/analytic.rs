@@ -6,13 +6,13 @@ use crate::support::bodies::coin_iterations;
 use crate::support::reference::{
     ellipsoids, equal_spheres, image_series, spheres_by_wall, unequal_spheres,
 };
-use crate::support::{mesh, scaled_error};
+use crate::support::{mesh, says, scaled_error};
 use hydrograd::Error;
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, Vec6, exp_matrix, skew};
 use hydrograd::boundary::{BodyBoundary, Method, MfsSettings};
 use hydrograd::coupling::full::{Full, FullSolver, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, CouplingReport, Direction, Exclusions, Isolated, Linearise};
-use hydrograd::scene::{Shape, Wall};
+use hydrograd::scene::{Shape, Wall, WallSurface};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, LazyLock};
 
@@ -868,6 +868,15 @@ fn settings_without_meaning_are_refused() {
             Some(Error::Input { .. })
         ));
     }
+    // Panels have free surfaces, with the fidelity full too.
+    let free = Wall {
+        surface: WallSurface::Free,
+        ..wall([0.0, 0.0, 1.0])
+    };
+    let error = refused(&[free], tight()).unwrap();
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+    let who = ["walls[0]", "full by fundamental solutions", "method panel"];
+    says(error, &who);
     let gmres = SolveSettings {
         solver: FullSolver::Gmres,
         ..tight()

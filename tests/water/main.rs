@@ -1,6 +1,7 @@
 //! Added mass and flow: one body by each method, coupled bodies by each fidelity, against exact values.
 
 mod analytic;
+mod asked;
 mod auto;
 mod corners;
 mod estimate;

@@ -1,10 +1,10 @@
 //! What every way to solve one body gives: added mass against exact values, in any unit and about any origin.
 
 use crate::support::bodies::mapped;
-use crate::support::mesh;
 use crate::support::reference::lamb;
+use crate::support::{mesh, says};
 use hydrograd::adjoint::lie::{Mat6, Vec3, skew};
-use hydrograd::boundary::{BodyBoundary, MfsSettings, PanelBoundary};
+use hydrograd::boundary::{BodyBoundary, MfsSettings, PanelBoundary, Response};
 use hydrograd::scene::Shape;
 use hydrograd::{Error, TriMesh};
 
@@ -128,6 +128,20 @@ fn another_origin_transforms_the_matrix() {
             let error = (there.added_mass - expected).abs().max() / expected.abs().max();
             assert!(error < tolerance, "{method:?} {shift:?}: {error:e}");
         }
+    }
+}
+
+/// Bodies that were never solved alone refuse to tell their flow.
+#[test]
+fn without_a_factor_there_is_no_flow() {
+    let ball = mesh(&Shape::sphere(1.0), 80);
+    let body = BodyBoundary::unfactored("large", &ball, &MfsSettings::default()).unwrap();
+    let away = [Vec3::new(0.0, 0.0, 2.0)];
+    let (radiated, scattered) = (body.radiated(&away), body.scattered(&away, &away));
+    for (found, flow) in [(radiated, "radiated"), (scattered, "scattered")] {
+        let error = found.err().unwrap();
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+        says(error, &[flow, "\"large\"", "80 faces"]);
     }
 }
 

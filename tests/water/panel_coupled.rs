@@ -1,7 +1,7 @@
 //! Bodies and walls in one panel system, against exact values and against itself.
 
-use crate::support::mesh;
 use crate::support::reference::{TwoSpheres, equal_spheres, spheres_by_wall, unequal_spheres};
+use crate::support::{mesh, says};
 use hydrograd::adjoint::lie::{Mat3, Mat6, Pose, Vec3, exp_matrix};
 use hydrograd::boundary::PanelBoundary;
 use hydrograd::boundary::panel::MOST_FACES;
@@ -419,6 +419,73 @@ fn overlaps_and_impossible_settings_are_errors() {
     // Poses for fewer bodies.
     let error = c.evaluate(&[at(0.0)], &DMatrix::identity(12, 12));
     assert!(matches!(error, Err(Error::Input { .. })));
+}
+
+/// Bodies of equal shape share their panels, but not their names.
+#[test]
+fn equal_bodies_are_told_apart() {
+    let beside = |x: f64, z: f64| {
+        let second = Pose::new(Mat3::identity(), Vec3::new(x, 0.0, z));
+        [at(0.0), second]
+    };
+    let all = DMatrix::identity(12, 12);
+    let said = |c: &dyn Coupling, poses: [Pose; 2]| {
+        let error = c.evaluate(&poses, &all).err();
+        error.expect("refused").to_string()
+    };
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.add_wall([0.0, 0.0, -2.0], [0.0, 0.0, 1.0]);
+    for (name, x) in [("left", 0.0), ("right", 3.0)] {
+        let ball = Body::new(Shape::sphere(1.0).faces(80)).named(name);
+        scene.add(ball.density(1000.0).at([x, 0.0, 0.0]));
+    }
+    for films in [false, true] {
+        let settings = Settings::default()
+            .fidelity(Fidelity::Full)
+            .method(Method::Panel)
+            .films(films);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let coupling = simulator.system().coupling.as_ref();
+        let apart = beside(1.5, 0.0);
+        says(said(coupling, apart), &["\"left\"", "\"right\""]);
+        let through = said(coupling, beside(3.0, -1.5));
+        says(&through, &["\"right\"", "wall"]);
+        assert!(!through.contains("left"), "{through}");
+    }
+    let ball = named("ball", &ellipsoid([1.0; 3], 80));
+    let settings = SolveSettings::default();
+    let pair = PanelCoupled::new(vec![ball; 2], &[], Exclusions::none(), settings).unwrap();
+    let pair = pair.named(["pike", "perch", "nobody"].map(String::from));
+    let names = ["\"pike\"", "\"perch\""];
+    says(said(&pair, beside(1.5, 0.0)), &names);
+}
+
+/// A scene's coupled panels make as many iterations as are asked for, and no more.
+#[test]
+fn iterations_are_as_asked_for() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for z in [0.0, 2.1] {
+        let ball = Body::new(Shape::sphere(1.0).faces(320)).density(1000.0);
+        scene.add(ball.at([0.0, 0.0, z]));
+    }
+    let solve = |most: usize| -> Result<_> {
+        let settings = Settings::default()
+            .fidelity(Fidelity::Full)
+            .method(Method::Panel)
+            .films(false)
+            .tolerance(1e-12)
+            .max_iterations(most);
+        Simulator::new(&scene, settings)?.added_mass()
+    };
+    let error = solve(0).err().unwrap();
+    assert!(matches!(error, Error::Input { .. }), "{error}");
+    says(error, &["max_iterations", "at least 1"]);
+    let error = solve(1).err().unwrap();
+    assert!(
+        matches!(error, Error::Solver { iterations: 1, .. }),
+        "{error}"
+    );
+    assert!(solve(100).is_ok());
 }
 
 #[test]

@@ -255,4 +255,17 @@ fn what_is_refused_is_named() {
         said.contains("films: surfaces") && said.contains('2'),
         "{said}"
     );
+    // Where there are no films panels say it: under a free surface.
+    let filmed = near(&[wall(WallSurface::Free)], &Exclusions::none()).filmed;
+    let filmed = filmed.named(["block", "ball"].map(String::from));
+    let through = [
+        poses()[0],
+        Pose::new(exp_matrix(&Vec3::zeros()), Vec3::new(2.0, 0.0, 0.1)),
+    ];
+    let said = filmed.evaluate(&through, &DMatrix::identity(12, 12));
+    let said = said.err().unwrap().to_string();
+    assert!(
+        said.contains("\"ball\"") && said.contains("wall 0"),
+        "{said}"
+    );
 }

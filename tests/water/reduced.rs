@@ -6,7 +6,7 @@ use crate::support::says;
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
 use hydrograd::boundary::{ExactBoundary, PanelBoundary};
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
-use hydrograd::coupling::{Coupling, Direction, Linearise};
+use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::Method;
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
@@ -148,6 +148,29 @@ fn gaps_far_below_what_is_resolved_are_errors_with_numbers() {
     println!("{error}");
     for word in ["left", "right", "5.000e-1", "full"] {
         assert!(error.contains(word), "{error}");
+    }
+}
+
+/// Pairs that are left out have no film, whichever was said first.
+#[test]
+fn films_and_pairs_that_are_left_out_come_in_any_order() {
+    let (body, surface) = (sphere(Some(40), 1e-2, 0.5), mesh(&Shape::sphere(1.0), 320));
+    let pair = || Reduced::new(vec![body.clone(); 2], &[], |_, _| None).unwrap();
+    let filmed = |pair: Reduced| {
+        pair.with_films(&[(&surface, None), (&surface, None)], &[1e-2; 2], &[])
+            .unwrap()
+    };
+    let apart = |pair: Reduced| pair.excluding(&Exclusions::new([(0, 1)])).unwrap();
+    let poses = [at(0.0, 0.0, 0.0), at(0.0, 0.0, 2.05)];
+    let right = matrix(&apart(pair()), &poses);
+    let films = |coupling: &Reduced| {
+        let found = coupling.film_momenta(&poses, &DMatrix::identity(12, 12));
+        found.unwrap().unwrap().amax()
+    };
+    assert!(films(&filmed(pair())) > 0.0);
+    for both in [apart(filmed(pair())), filmed(apart(pair()))] {
+        assert_eq!(films(&both), 0.0);
+        assert_eq!(matrix(&both, &poses), right);
     }
 }
 

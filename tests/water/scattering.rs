@@ -643,6 +643,29 @@ fn what_isnt_there_is_refused_by_name() {
     );
 }
 
+/// From a factor come its bodies' names, of which those of equal shape have one in what they are compressed to.
+#[test]
+fn a_factors_names_are_kept() {
+    let (kinds, surface) = (kinds(0.03), mesh(&Shape::sphere(1.0), 320));
+    let factor = Reduced::new(vec![kinds[0].clone(); 2], &[], |_, _| None).unwrap();
+    let factor = factor
+        .named(["pike", "perch"].map(String::from))
+        .with_films(&[(&surface, None), (&surface, None)], &[0.03; 2], &[])
+        .unwrap();
+    assert_eq!(factor.names(), ["pike", "perch"]);
+    let beside = |x: f64| {
+        let first = Pose::identity();
+        [first, Pose::new(first.rotation, Vec3::new(x, 0.0, 0.0))]
+    };
+    let levels = Levels::for_accuracy(0.01).unwrap();
+    let many = Scattering::of(&factor, &beside(3.0), levels).unwrap();
+    let basis = DMatrix::from_element(12, 1, 1.0);
+    says(
+        refusal(many.evaluate(&beside(1.5), &basis)),
+        &["pike", "perch"],
+    );
+}
+
 #[test]
 fn bodies_in_one_another_are_an_error_not_a_number() {
     let kinds = kinds(0.03);

@@ -106,8 +106,8 @@ impl BodyBoundary {
 
     /// As [`BodyBoundary::new`] for bodies of too many faces to factor: nothing of the size of a matrix
     /// is made. What a solve of the body alone gives is missing: K, strengths, the factor and the added mass
-    /// are empty or zero, and the potential is read out without the own residual flux ([`Readout`]'s centre
-    /// flux). For backends that need no matrix.
+    /// are empty or zero, its flow ([`Response`]) isn't told, and the potential is read out without the own
+    /// residual flux ([`Readout`]'s centre flux). For backends that need no matrix.
     ///
     /// # Errors
     /// As [`BodyBoundary::new`].
@@ -262,6 +262,22 @@ impl BodyBoundary {
         self.r.ncols() == self.sources.len()
     }
 
+    /// Refuses to tell the flow of a body that was never solved alone.
+    fn check_factored(&self, flow: &str) -> Result<()> {
+        if self.factored() {
+            return Ok(());
+        }
+        Err(Error::Unsupported {
+            what: format!(
+                "the flow {flow} by body \"{}\" with {} faces",
+                self.name,
+                self.faces.len()
+            ),
+            why: "it was made without a factor".into(),
+            instead: "make it by BodyBoundary::new, of fewer faces if it doesn't fit".into(),
+        })
+    }
+
     /// `x ← R⁻¹ x`, x sources × columns.
     pub fn solve_factor(&self, x: MatMut<'_, f64>) {
         factor::solve_upper(self.r.as_ref(), x);
@@ -279,11 +295,13 @@ impl Response for BodyBoundary {
     }
 
     fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
+        self.check_factored("radiated")?;
         let alpha = Mat::from_fn(self.sources.len(), 6, |j, k| self.strengths[j][k]);
         Ok(potentials(points, &self.sources) * alpha)
     }
 
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {
+        self.check_factored("scattered")?;
         let rows = self.rows_of(sources);
         let rows = MatRef::from_row_major_slice(&rows, self.faces.len(), sources.len());
         // (KᵀK + D²) α = −Kᵀ k(y)

@@ -121,6 +121,15 @@ pub(super) struct AddedMassReport {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
+    if output.json && arguments.format.is_some() {
+        // The arguments' own check doesn't see what stands before the command.
+        output.error(&Error::input(
+            "--format",
+            "--json besides",
+            "give one of them: its text isn't the report",
+        ));
+        return Ok(Exit::Usage);
+    }
     let scene = arguments
         .source
         .scene(arguments.density, &arguments.robot)?;

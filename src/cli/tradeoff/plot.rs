@@ -1,12 +1,12 @@
 //! The picture: time against error, log–log.
 
-use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use crate::simulate::{Fidelity, Method};
+use crate::simulate::{Fidelity, Method, Recording, replace};
 use crate::tradeoff::{Tradeoff, TradeoffReference, TradeoffRow, short};
 use crate::{Error, Result};
 
@@ -44,23 +44,18 @@ pub(super) fn prepare(file: &Path) -> Result<()> {
         return Err(refuse(file, "is a folder: give the name of a file"));
     }
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty());
-    let Some(folder) = folder else { return Ok(()) };
-    fs::create_dir_all(folder).map_err(|e| failed(file, e))
+    Recording::prepare(folder.unwrap_or(Path::new(".")))
 }
 
-/// Writes the picture.
+/// Writes the picture; a file that stood there is replaced only once it is complete.
 pub(super) fn write(file: &Path, found: &Tradeoff) -> Result<()> {
     let mut text = String::new();
-    draw(&mut text, found).map_err(|e| failed(file, std::io::Error::other(e.to_string())))?;
-    fs::write(file, text).map_err(|e| failed(file, e))
-}
-
-fn failed(file: &Path, source: std::io::Error) -> Error {
-    Error::File {
+    draw(&mut text, found).map_err(|e| Error::File {
         path: file.to_owned(),
         action: "write",
-        source,
-    }
+        source: std::io::Error::other(e.to_string()),
+    })?;
+    replace(file, |out| out.write_all(text.as_bytes()))
 }
 
 /// One chart of the picture.

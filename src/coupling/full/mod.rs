@@ -37,6 +37,7 @@ pub use model::Model;
 pub use settings::{FullSolver, Preconditioner, SolveSettings};
 
 use super::response::{CoupledResponse, Solved};
+use super::settings::check_asked;
 use super::surface::{self, Charges, Seen};
 use super::surface_back::{Back, onto_charges, pull, wrenches};
 use super::{
@@ -124,6 +125,7 @@ impl Full {
         poses: &[Pose],
         basis: &DMatrix<f64>,
     ) -> Result<Solved<dyn CoupledResponse + '_>> {
+        check_asked(self, poses, basis)?;
         let volume = |b: usize| self.model.bodies[b].faces.volume();
         Solved::new(self.backend.respond(poses, basis)?, basis, volume, 0.0)
     }
@@ -174,6 +176,7 @@ impl Coupling for Full {
         }
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
+        check_asked(self, poses, &column)?;
         let strengths = self.backend.respond(poses, &column)?.densities()?;
         let mut sources: Vec<(Vec3, f64)> = Vec::new();
         for image in &model.images {

@@ -48,7 +48,7 @@ impl Model {
         Ok(Self {
             faces: ranges(bodies.iter().map(|b| b.faces.len())),
             sources: ranges(bodies.iter().map(|b| b.sources.len())),
-            images: Image::of_rigid_walls(walls, "the fidelity full")?,
+            images: Image::of_rigid_walls(walls, "the fidelity full by fundamental solutions")?,
             excluded,
             sparse_factors: sparse_factors(&bodies, &settings)?,
             bodies,

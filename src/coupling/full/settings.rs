@@ -46,7 +46,7 @@ pub struct SolveSettings {
     /// Relative residual at which it stops: ‖R⁻ᵀ(g − KᵀKx)‖ ≤ tolerance ‖R⁻ᵀg‖ for CGLS,
     /// ‖b − Kx‖ ≤ tolerance ‖b‖ for GMRES.
     pub tolerance: f64,
-    /// Iterations after which it gives up with an error.
+    /// Iterations after which it gives up with an error. Where this is the default the coupled panels of a scene give up after 500.
     pub max_iterations: usize,
     /// ρ of [`Preconditioner::Csd24`], 1 to 20: how far, in its own scales, a source of a body reaches others of it.
     pub csd24_rho: f64,

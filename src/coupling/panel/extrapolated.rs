@@ -227,6 +227,11 @@ impl HeldApart for ExtrapolatedPanels {
         &self.fine
     }
 
+    fn rename(&mut self, names: &[String]) {
+        self.fine.rename(names);
+        self.coarse.rename(names);
+    }
+
     fn evaluate_held(
         &self,
         poses: &[Pose],

@@ -7,6 +7,7 @@ use super::PanelCoupled;
 use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::{FilmBody, Films, PlacedFilms, Shares};
+use crate::coupling::settings::check_asked;
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
     Pullback, ShapeTerm, SurfacePotential, Tangent, surface,
@@ -33,6 +34,9 @@ const SPLITS: usize = 2;
 pub(super) trait HeldApart: Coupling {
     /// Bodies' panels.
     fn panels(&self) -> &PanelCoupled;
+
+    /// Names the bodies, for messages.
+    fn rename(&mut self, names: &[String]);
 
     /// As [`Coupling::evaluate`], of bodies as far apart as the films hold them.
     ///
@@ -71,7 +75,6 @@ pub(super) trait HeldApart: Coupling {
 pub struct FilmedPanels {
     panels: Box<dyn HeldApart>,
     films: Films,
-    names: Vec<String>,
 }
 
 impl FilmedPanels {
@@ -96,18 +99,18 @@ impl FilmedPanels {
         let reaches: Vec<f64> = model.bodies.iter().map(reach).collect();
         let mut films = Films::new(bodies, reaches, &SHARES, walls)?;
         films.exclude(&model.excluded);
-        Ok(Self {
-            names: model.bodies.iter().map(|b| b.name.clone()).collect(),
-            panels,
-            films,
-        })
+        Ok(Self { panels, films })
     }
 
     /// The same with names of the bodies, for messages; those beyond the bodies are dropped.
     pub fn named(mut self, names: impl IntoIterator<Item = String>) -> Self {
-        let given = self.names.iter_mut().zip(names);
-        given.for_each(|(own, name)| *own = name);
+        let names: Vec<String> = names.into_iter().take(self.bodies()).collect();
+        self.panels.rename(&names);
         self
+    }
+
+    fn names(&self) -> &[String] {
+        &self.panels.panels().model().names
     }
 
     /// All films that there may be.
@@ -116,8 +119,8 @@ impl FilmedPanels {
     }
 
     fn placed(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Arc<PlacedFilms>> {
-        self.panels.panels().model().check_input(poses, basis)?;
-        Ok(Arc::new(self.films.place(poses, basis, &self.names)?))
+        check_asked(self, poses, basis)?;
+        Ok(Arc::new(self.films.place(poses, basis, self.names())?))
     }
 }
 
@@ -160,7 +163,8 @@ impl Coupling for FilmedPanels {
     }
 
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
-        Ok(Some(self.films.momenta(poses, twists, &self.names)?))
+        check_asked(self, poses, twists)?;
+        Ok(Some(self.films.momenta(poses, twists, self.names())?))
     }
 
     /// By the panels where they are.

@@ -40,6 +40,7 @@ pub use model::PanelModel;
 use super::film::PlacedFilms;
 use super::full::{SolveSettings, SystemBackend};
 use super::response::{CoupledResponse, Solved};
+use super::settings::check_asked;
 use super::surface::{check, check_bars};
 use super::{
     Coupling, Exclusions, Linearise, Linearised, Momenta, Motion, MotionBar, ShapeDirection,
@@ -99,6 +100,13 @@ impl PanelCoupled {
         Ok(self)
     }
 
+    /// The same with names of the bodies, for messages; those beyond the bodies are dropped. Before [`PanelCoupled::on`]: a backend has those of its model.
+    pub fn named(mut self, names: impl IntoIterator<Item = String>) -> Self {
+        let names: Vec<String> = names.into_iter().take(self.bodies()).collect();
+        self.rename(&names);
+        self
+    }
+
     /// On a backend made for the same model; [`Coupling::velocity`] stays on the CPU.
     pub fn on(self, backend: Box<dyn SystemBackend>) -> Self {
         Self {
@@ -149,7 +157,7 @@ impl PanelCoupled {
         films: &Arc<PlacedFilms>,
     ) -> Result<Solved<dyn CoupledResponse + 'a>> {
         let model = self.model();
-        model.check_input(poses, basis)?;
+        check_asked(self, poses, basis)?;
         let (response, condition) = self.respond(poses, basis, films)?;
         let volume = |b: usize| model.bodies[b].faces.volume();
         let solved = Solved::new(response, basis, volume, condition)?;
@@ -207,6 +215,7 @@ impl Coupling for PanelCoupled {
         }
         let model = self.model();
         let column = DMatrix::from_column_slice(twists.len(), 1, twists.as_slice());
+        check_asked(self, poses, &column)?;
         let placed = PlacedPanels::new(model, poses, &Arc::default(), &column)?;
         let phi = placed.potentials(&column)?;
         let mut out = vec![Vec3::zeros(); points.len()];
@@ -266,6 +275,10 @@ impl Linearise for PanelCoupled {
 impl HeldApart for PanelCoupled {
     fn panels(&self) -> &PanelCoupled {
         self
+    }
+
+    fn rename(&mut self, names: &[String]) {
+        Arc::make_mut(&mut self.model).rename(names);
     }
 
     fn evaluate_held(

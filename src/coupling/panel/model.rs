@@ -1,6 +1,6 @@
 //! What the coupled panels consist of.
 
-use crate::adjoint::lie::{Mat6, Pose};
+use crate::adjoint::lie::Mat6;
 use crate::boundary::PanelBoundary;
 use crate::boundary::panel::{MassSlopes, check_size};
 use crate::coupling::full::SolveSettings;
@@ -18,6 +18,8 @@ use std::sync::{Arc, Mutex};
 pub struct PanelModel {
     /// The bodies, each in its own frame; those of equal shape share one.
     pub bodies: Vec<Arc<PanelBoundary>>,
+    /// For messages: bodies of equal shape share their panels.
+    pub(super) names: Vec<String>,
     /// Images that the walls make, in the world frame; the identity first.
     pub images: Vec<Image>,
     pub(super) walls: Vec<HalfSpace>,
@@ -59,6 +61,7 @@ impl PanelModel {
             walls: Wall::half_spaces(walls)?,
             lacking: vec![Mat6::zeros(); bodies.len()],
             known: vec![false; bodies.len()],
+            names: bodies.iter().map(|b| b.name.clone()).collect(),
             bodies,
             settings,
             faces,
@@ -67,6 +70,12 @@ impl PanelModel {
             lacking_rates: Arc::default(),
             spare: Arc::default(),
         })
+    }
+
+    /// Names the bodies, for messages.
+    pub(super) fn rename(&mut self, names: &[String]) {
+        let given = self.names.iter_mut().zip(names);
+        given.for_each(|(own, name)| own.clone_from(name));
     }
 
     /// Sets the added mass of each body in unbounded fluid where it is known.
@@ -141,18 +150,5 @@ impl PanelModel {
             out.rows_mut(6 * b, 6).copy_from(&own);
         }
         out
-    }
-
-    /// Refuses poses and twists that aren't those of the bodies.
-    pub(super) fn check_input(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<()> {
-        let bodies = self.bodies.len();
-        if poses.len() == bodies && basis.nrows() == 6 * bodies {
-            return Ok(());
-        }
-        Err(Error::input(
-            "coupled panel method: poses and basis",
-            format!("{} poses, {} rows", poses.len(), basis.nrows()),
-            format!("one pose and six rows for each of the {bodies} bodies"),
-        ))
     }
 }

@@ -246,18 +246,18 @@ impl Placed<'_> {
     }
 
     fn overlap(&self, source: usize, target: usize, face: usize, filled: f64) -> Error {
-        let bodies = &self.coupled.bodies;
-        let (a, b) = (&bodies[target], &bodies[source]);
-        let x = self.poses[target].apply(&a.faces.centres[face]);
+        let coupled = self.coupled;
+        let [a, b] = [target, source].map(|body| &coupled.names[body]);
+        let x = self.poses[target].apply(&coupled.bodies[target].faces.centres[face]);
         let (place, quantity, remedy) = if source == target {
             (
-                format!("body \"{}\" and its mirror image", a.name),
+                format!("body \"{a}\" and its mirror image"),
                 "its image",
                 "it reaches through a wall: move it into the fluid",
             )
         } else {
             (
-                format!("body \"{}\" and body \"{}\"", a.name, b.name),
+                format!("body \"{a}\" and body \"{b}\""),
                 "the second",
                 "they overlap: move them apart",
             )
@@ -282,14 +282,14 @@ impl PanelModel {
     /// # Errors
     /// One that isn't.
     pub(super) fn check_walls(&self, poses: &[Pose]) -> Result<()> {
-        for (body, pose) in self.bodies.iter().zip(poses) {
+        for ((body, name), pose) in self.bodies.iter().zip(&self.names).zip(poses) {
             for (w, wall) in self.walls.iter().enumerate() {
                 let corners = body.faces.corners.iter().flatten();
                 let height = |c: &Vec3| wall.height(&pose.apply(c));
                 let lowest = corners.map(height).fold(f64::INFINITY, f64::min);
                 if lowest < 0.0 {
                     return Err(Error::Unresolved {
-                        place: format!("body \"{}\" and wall {w}", body.name),
+                        place: format!("body \"{name}\" and wall {w}"),
                         quantity: "gap in m".into(),
                         value: lowest,
                         limit: 0.0,

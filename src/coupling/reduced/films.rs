@@ -76,6 +76,7 @@ impl Reduced {
         walls: &[Wall],
     ) -> Result<Self> {
         self.films = films(&self.bodies, surfaces, tolerances, walls)?;
+        self.films.exclude(&self.excluded);
         Ok(self)
     }
 

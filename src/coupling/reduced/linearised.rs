@@ -10,6 +10,7 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6, linear, point_wrench};
 use crate::boundary::PanelBoundary;
 use crate::coupling::film::PlacedFilms;
 use crate::coupling::pair::{vector, wrench};
+use crate::coupling::settings::check_asked;
 use crate::coupling::surface;
 use crate::coupling::{
     Coupling, CouplingReport, Direction, Linearise, Linearised, Momenta, Motion, MotionBar,
@@ -69,6 +70,7 @@ pub(super) struct ReducedResponse {
 
 impl<'a> ReducedLinearised<'a> {
     pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
+        check_asked(reduced, poses, basis)?;
         let films = reduced.placed_films(poses, basis)?;
         let place = |link: &'a Link| {
             let placed = link.place(&reduced.bodies, poses, &films)?;
@@ -399,6 +401,7 @@ impl Coupling for Reduced {
     }
 
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        check_asked(self, poses, twists)?;
         Ok(Some(self.films.momenta(poses, twists, &self.names)?))
     }
 

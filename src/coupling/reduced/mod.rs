@@ -64,6 +64,8 @@ pub struct Reduced {
     links: Vec<Link>,
     /// Of gaps that the sources don't resolve.
     films: Films,
+    /// Pairs of bodies that don't feel each other but by images: also of films that are given later.
+    excluded: Exclusions,
     points: Vec<Range<usize>>,
     modes: Vec<Range<usize>>,
     /// A body with its slope, one a shape parameter.
@@ -89,6 +91,7 @@ impl Reduced {
             links,
             shapes: Vec::new(),
             films: Films::default(),
+            excluded: Exclusions::none(),
             names: bodies.iter().map(|b| b.parts().name.clone()).collect(),
             bodies,
         })
@@ -103,6 +106,7 @@ impl Reduced {
         let apart = |l: &Link| !l.image.is_identity() || !pairs.contains(l.target, l.source);
         self.links.retain(apart);
         self.films.exclude(pairs);
+        self.excluded = Exclusions::new(self.excluded.iter().chain(pairs.iter()));
         Ok(self)
     }
 
@@ -133,6 +137,11 @@ impl Reduced {
         let given = self.names.iter_mut().zip(names);
         given.for_each(|(own, name)| *own = name);
         self
+    }
+
+    /// Names of the bodies, for messages.
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// The bodies.

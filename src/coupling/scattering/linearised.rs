@@ -8,6 +8,7 @@ use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::boundary::PanelBoundary;
 use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
+use crate::coupling::settings::check_asked;
 use crate::coupling::{
     Carried, Coupling, CouplingReport, Direction, Linearised, Momenta, Motion, MotionBar, Pullback,
     SurfacePotential, Tangent,
@@ -133,6 +134,7 @@ impl<'a> ScatteredLinearised<'a> {
     }
 
     fn dense(model: &'a Scattering, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
+        check_asked(model, poses, basis)?;
         let at = model.place(poses, Box::new(Dense(basis.clone())))?;
         let mut momenta = DMatrix::zeros(basis.nrows(), basis.ncols());
         for (k, mut out) in momenta.column_iter_mut().enumerate() {
@@ -316,6 +318,7 @@ impl Coupling for Scattering {
     }
 
     fn film_momenta(&self, poses: &[Pose], twists: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>> {
+        check_asked(self, poses, twists)?;
         Ok(Some(self.films.momenta(poses, twists, &self.names)?))
     }
 

@@ -203,7 +203,7 @@ impl Scattering {
         self
     }
 
-    /// From bodies that were coupled by a factor, with its films.
+    /// From bodies that were coupled by a factor, with their names and its films.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for images and pairs that fade out or are left out; as [`Scattering::new`].
@@ -218,7 +218,7 @@ impl Scattering {
                 instead: "use the coupling by a factor".into(),
             });
         }
-        let names = bodies.iter().map(|b| b.parts().name.clone()).collect();
+        let names = reduced.names().to_vec();
         let made = Self::new(bodies.to_vec(), names, start, levels)?;
         Ok(made.with_films(reduced.films().clone()))
     }

@@ -125,7 +125,7 @@ impl Experiment {
         self
     }
 
-    /// Makes a parameter `factor` times what an unknown sets it to, in this experiment: where a law says how it depends on what was done.
+    /// Makes a parameter `factor` times what an unknown sets it to, in this experiment: where a law says how it depends on what was done. Starts and roots of inertias aren't scaled.
     pub fn scaled(mut self, parameter: impl Into<String>, factor: f64) -> Self {
         self.scales.insert(parameter.into(), factor);
         self
@@ -157,7 +157,7 @@ impl Experiment {
         format!("experiment {:?}", self.name)
     }
 
-    /// Refuses what doesn't fit; `set` are the names of what unknowns set.
+    /// Refuses what doesn't fit; `set` are the names of the parameters that unknowns set.
     pub(super) fn check(&self, set: &BTreeSet<&str>) -> Result<()> {
         let place = |of: &str| format!("{}: {of}", self.place());
         if self.residuals() == 0 && self.derived.is_empty() {
@@ -173,7 +173,9 @@ impl Experiment {
         let steps = self.controls.steps();
         for (name, factor) in &self.scales {
             if !set.contains(name.as_str()) {
-                let remedy = "no unknown sets this parameter: give the simulator the value itself";
+                let remedy = format!(
+                    "no unknown sets a parameter of this name: give the simulator the value itself; scaled are parameters that unknowns set, {set:?}, not starts or roots of inertias"
+                );
                 return Err(Error::input(place("scale"), format!("{name:?}"), remedy));
             }
             if !factor.is_finite() {

@@ -169,7 +169,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
                 !(x[i] <= least && gradient[i] > 0.0 || x[i] >= largest && gradient[i] < 0.0)
             })
             .collect();
-        let (mut size, mut at_bound) = (0.0, false);
+        let (mut size, mut cut) = (0.0, Vec::new());
         while !free.is_empty() {
             free.iter().for_each(|i| delta[*i] = 0.0);
             let right = residuals + jacobian * &delta;
@@ -181,9 +181,9 @@ impl<'m, 'a> Marquardt<'m, 'a> {
                 match (least..=largest).contains(&to) {
                     true => kept.push(i),
                     false => {
-                        delta[i] = to.clamp(least, largest) - x[i];
-                        // However short: the others go on from there.
-                        at_bound = true;
+                        let bound = to.clamp(least, largest);
+                        delta[i] = bound - x[i];
+                        cut.push((i, bound));
                     }
                 }
             }
@@ -198,10 +198,16 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             free = kept;
         }
         let after = residuals + jacobian * &delta;
+        let mut to = self.misfit.within(x + &delta);
+        // To the bit, by which a bound is known to hold: the sum may round to beside it.
+        for (i, bound) in &cut {
+            to[*i] = *bound;
+        }
         Step {
             expected: 0.5 * (residuals.norm_squared() - after.norm_squared()),
-            to: self.misfit.within(x + &delta),
-            size: if at_bound { f64::INFINITY } else { size },
+            to,
+            // Cut at a bound it counts as long, however short: the others go on from there.
+            size: if cut.is_empty() { size } else { f64::INFINITY },
         }
     }
 

@@ -116,10 +116,16 @@ impl<'a> Misfit<'a> {
                 }
             }
         }
+        let sets = unknowns.iter().flat_map(|u| &u.sets);
+        let parameters = sets.filter_map(|(target, _)| match target {
+            Target::Parameter(name) => Some(name.as_str()),
+            Target::Start(_) | Target::Root { .. } => None,
+        });
+        let parameters: BTreeSet<&str> = parameters.collect();
         let mut coordinates = unknowns.len();
         let (mut settings, mut starts) = (Vec::new(), Vec::new());
         for experiment in experiments {
-            experiment.check(&taken)?;
+            experiment.check(&parameters)?;
             let own = settings_of(&unknowns, experiment);
             settings.push(own.map_err(|e| e.within(&experiment.place()))?);
             let start = experiment.start.map(|deviations| Start {

@@ -155,6 +155,7 @@ pub(super) fn solve(
     // Whether the model is this trajectory's, and whether all steps from here were refused so far.
     let (mut iterations, mut fresh, mut refused) = (0, true, false);
     let grow = |mu: f64| (mu * GROWTH).max(LEAST);
+    let is_reached = |cost: f64| settings.target.is_some_and(|target| cost <= target);
     let mut answers;
     let stop = loop {
         if !fresh {
@@ -188,7 +189,7 @@ pub(super) fn solve(
                 break IlqrStop::Stuck;
             }
         }
-        if settings.target.is_some_and(|t| run.cost <= t) {
+        if is_reached(run.cost) {
             break IlqrStop::Target;
         }
         if iterations == settings.iterations {
@@ -233,7 +234,10 @@ pub(super) fn solve(
             break IlqrStop::Stuck;
         }
         if iterations == settings.iterations && !settings.last_gains {
-            break IlqrStop::Budget;
+            break match is_reached(run.cost) {
+                true => IlqrStop::Target,
+                false => IlqrStop::Budget,
+            };
         }
     };
     if !fresh && settings.last_gains {

@@ -135,13 +135,9 @@ impl Guess<'_> {
                         plan.before_limits(at, q, v).0
                     };
                 // Far from the plan its feedback may do harm; then its controls, then none.
-                let last = track.controls.ncols() - 1;
                 let alone =
                     |k: usize, _: &DVector<f64>, _: &DVector<f64>, _: Option<&DVector<f64>>| {
-                        track
-                            .controls
-                            .column((step(k) / track.hold).min(last))
-                            .into_owned()
+                        plan.planned(step(k))
                     };
                 ready
                     .run(simulator, start, with_feedback)

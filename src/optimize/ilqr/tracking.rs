@@ -36,6 +36,13 @@ impl Tracking {
         (steps + ROUNDING).floor() as isize
     }
 
+    /// Controls of the plan at its time step `step`, without feedback.
+    pub(in crate::optimize) fn planned(&self, step: usize) -> DVector<f64> {
+        let Track { controls, hold, .. } = &*self.0;
+        let last = controls.ncols() - 1;
+        controls.column((step / hold).min(last)).into_owned()
+    }
+
     /// Controls at the plan's time step `step` and a state, and the change of the state against the plan where there is feedback.
     pub(super) fn before_limits(
         &self,
@@ -44,13 +51,12 @@ impl Tracking {
         v: &DVector<f64>,
     ) -> (DVector<f64>, Option<(usize, DVector<f64>)>) {
         let Track { controls, hold, .. } = &*self.0;
-        let last = controls.ncols() - 1;
         let at = usize::try_from(step).ok();
-        let knot = at.map_or(0, |step| step / hold).min(last);
-        let mut u = controls.column(knot).into_owned();
+        let mut u = self.planned(at.unwrap_or(0));
         match at.filter(|step| *step < controls.ncols() * hold) {
             None => (u, None),
             Some(step) => {
+                let knot = step / hold;
                 let (planned_q, planned_v) = &self.0.states[step];
                 let moved =
                     super::problem::moved(&self.0.simulator, (planned_q, planned_v), (q, v));

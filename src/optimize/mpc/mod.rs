@@ -208,6 +208,8 @@ impl Mpc {
         v: &DVector<f64>,
         progress: &mut dyn FnMut(&IlqrProgress) -> ControlFlow<()>,
     ) -> Result<DVector<f64>> {
+        // Once there is a plan its feedback would answer to any numbers.
+        self.model.check_numbers("mpc:", q, v)?;
         if self.plan.is_none() {
             self.start = time;
         }
@@ -239,14 +241,10 @@ impl Mpc {
             });
         };
         let step = (now - at) as isize;
+        // The plan's knots are its own: those of a problem given since may be held longer.
         let control = match self.settings.feedback {
             true => plan.tracking().control(step, q, v)?,
-            false => {
-                let knot = step as usize / self.ready.hold;
-                plan.controls
-                    .column(knot.min(self.ready.knots - 1))
-                    .into_owned()
-            }
+            false => plan.tracking().planned(step as usize),
         };
         self.held = Some((now, control.clone()));
         Ok(control)
@@ -285,9 +283,9 @@ impl Mpc {
         if let Some((_, held)) = &self.held {
             self.ready.previous = Some(held.clone());
         }
-        // The model's clock is the plant's, so that what changes with time does so for both.
+        // The model's clock is the plant's to half a step, so that what changes with time does so for both.
         let step = (time / self.model.time_step()).round().max(0.0) as usize;
-        let made = (self.model.state(step, q, v)).and_then(|state| {
+        let made = (self.model.state_of_plant(step, q, v)).and_then(|state| {
             ilqr::solve(&self.model, &state, &self.ready, guess, &settings, progress)
         });
         let mut told = Replan {

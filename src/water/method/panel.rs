@@ -16,7 +16,7 @@ use crate::water::submerged::{Discretisation, Made, SubmergedBody, once, shared}
 use crate::water::surface::Coarse;
 use std::sync::Arc;
 
-/// Iterations of the coupled panels after which they are given up.
+/// Iterations of the coupled panels after which they are given up, unless another number is asked for.
 const MOST_ITERATIONS: usize = 500;
 /// Part of an edge from which panels resolve a gap: a disc flat over a wall, which is hard, has 7 % too much added mass there.
 const RESOLVED: f64 = 0.1;
@@ -178,11 +178,10 @@ impl Panels {
         for body in problem.bodies {
             surfaces.push((body.surface("full")?, body.solid));
         }
-        let filmed = match self {
+        match self {
             Self::Alone(panels) => panels.with_films(&surfaces, problem.walls),
             Self::Extrapolated(panels) => panels.with_films(&surfaces, problem.walls),
-        };
-        Ok(filmed?.named(problem.bodies.iter().map(|b| b.name.to_string())))
+        }
     }
 }
 
@@ -233,14 +232,19 @@ impl BodyMethod for Panel {
         let own: Vec<_> = (made.iter())
             .map(|m| Some(m.known?.coupled(m.coarse.as_ref()?)))
             .collect();
+        let (asked, usual) = (problem.numerics.solve, SolveSettings::default());
         let solve = SolveSettings {
-            max_iterations: MOST_ITERATIONS,
-            ..problem.numerics.solve
+            max_iterations: match asked.max_iterations == usual.max_iterations {
+                true => MOST_ITERATIONS,
+                false => asked.max_iterations,
+            },
+            ..asked
         };
         let mut coupled = |meshes: Vec<Arc<PanelBoundary>>| -> Result<PanelCoupled> {
             let excluded = problem.excluded.clone();
             let made = PanelCoupled::new(meshes, problem.walls, excluded, solve)?;
-            device.panels(made.with_added_mass(&own))
+            let names = problem.bodies.iter().map(|b| b.name.to_string());
+            device.panels(made.named(names).with_added_mass(&own))
         };
         let own_rates = shapes.own.clone();
         let fine = coupled(made.iter().map(|m| m.fine.clone()).collect())?;

@@ -8,7 +8,7 @@ use hydrograd::optimize::{
 };
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
 use hydrograd::{Error, Fidelity, Result, Settings, Simulator};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
 
 fn simulator() -> Simulator {
@@ -226,6 +226,33 @@ fn settings_that_cannot_be() {
         run.err().expect("an error"),
         &["mpc: plant", "controls: 6", "controls: 8"],
     );
+}
+
+/// Once there is a plan too, states that can't be have no controls, and move no clock.
+#[test]
+fn states_that_cannot_be() {
+    let sim = simulator();
+    let problem = Problem::new(5, Cost::default().running(terms::effort(1.0)));
+    let mut mpc = Mpc::new(&sim, &problem, MpcSettings::default()).unwrap();
+    let (q, v) = sim.start();
+    mpc.control(0.0, q, v).unwrap();
+    let with = |x: &DVector<f64>, i: usize, value: f64| {
+        let mut out = x.clone();
+        out[i] = value;
+        out
+    };
+    let cases = [
+        (with(q, 0, f64::NAN), v.clone(), ["mpc: q", "NaN"]),
+        (q.clone(), with(v, 3, f64::INFINITY), ["mpc: v", "inf"]),
+        (with(q, 3, 2.0), v.clone(), ["mpc: q of body", "length 2"]),
+        (DVector::zeros(3), v.clone(), ["mpc: q", "9 finite"]),
+    ];
+    for (q, v, words) in &cases {
+        says(mpc.control(sim.time_step(), q, v).unwrap_err(), words);
+    }
+    assert_eq!(mpc.replans().len(), 1);
+    let next = mpc.control(sim.time_step(), q, v).unwrap();
+    assert!(next.iter().all(|u| u.is_finite()));
 }
 
 struct Wrong(&'static str);

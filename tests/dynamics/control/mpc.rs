@@ -4,6 +4,7 @@ use super::{hand, solve, vehicle};
 use crate::support::root;
 use hydrograd::dynamics::Integrator;
 use hydrograd::optimize::{Cost, IlqrSettings, IlqrStop, Mpc, MpcSettings, Problem, terms};
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
@@ -151,4 +152,68 @@ fn controls_can_be_asked_for_step_by_step() {
     let second = mpc.run(&model, middle, 6, &problem.cost, go).unwrap();
     assert_eq!(second.rollout.states()[6].q, run.rollout.states()[12].q);
     assert_eq!([first.replans.len(), second.replans.len()], [2, 2]);
+}
+
+/// Until the next plan the last one's controls are held as it holds them, whatever a model's problem given since does.
+#[test]
+fn a_plan_keeps_its_knots() {
+    let model = simulator([0.1, 0.0, 0.0], Fidelity::Isolated, 0.02);
+    let settings = MpcSettings {
+        every: 30,
+        first_iterations: 2,
+        feedback: false,
+        ..MpcSettings::default()
+    };
+    let mut mpc = Mpc::new(&model, &problem(), settings).unwrap();
+    let (q, v) = model.start();
+    mpc.control(0.0, q, v).unwrap();
+    let planned = mpc.plan().unwrap().controls.clone();
+    assert!(planned.column(1) != planned.column(5));
+    let mut finer = problem().hold(1);
+    finer.knots = 60;
+    mpc.set_model(&model, &finer).unwrap();
+    for step in [5, 18] {
+        let control = mpc.control(0.02 * step as f64, q, v).unwrap();
+        assert_eq!(control, planned.column(step / 4), "step {step}");
+    }
+    assert_eq!(mpc.replans().len(), 1);
+}
+
+/// A cart on one that a motion shakes, at times of the plant that the model doesn't have: for the model the shaken one is where its own time has it.
+#[test]
+fn motions_go_by_the_models_clock() {
+    let shaken = |time_step: f64| {
+        let mut scene = Scene::new(Fluid::none());
+        scene.time_step = time_step;
+        let body = |name: &str| {
+            let axis = [1.0, 0.0, 0.0];
+            let body = Body::dry().named(name).mass(1.0).inertia([0.1; 3]);
+            body.joint(Joint::Prismatic { axis })
+        };
+        let shake = Motion::Sine {
+            offset: 0.0,
+            amplitude: 0.2,
+            frequency: 3.0,
+            phase: 0.4,
+        };
+        scene.add(body("shaker").driven([shake]));
+        scene.add(body("cart").child_of("shaker").actuated());
+        Simulator::new(&scene, Settings::default()).unwrap()
+    };
+    let (model, plant) = (shaken(0.05), shaken(0.02));
+    let cost = Cost::default()
+        .running(terms::configuration([0.0; 2], 1.0))
+        .running(terms::effort(0.1));
+    let problem = Problem::new(10, cost);
+    let mut mpc = Mpc::new(&model, &problem, MpcSettings::default()).unwrap();
+    let start = plant.initial().unwrap();
+    let go = |_: &_| ControlFlow::Continue(());
+    let run = mpc.run(&plant, &start, 30, &problem.cost, go).unwrap();
+    let failures: Vec<_> = run
+        .replans
+        .iter()
+        .filter_map(|r| r.failure.as_ref())
+        .collect();
+    assert!(failures.is_empty(), "{failures:?}");
+    assert_eq!(run.replans.len(), 12);
 }

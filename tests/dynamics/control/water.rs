@@ -308,6 +308,16 @@ fn other_ways_to_end() {
         }),
         IlqrStop::Budget
     );
+    // By the last iteration that there is, too.
+    assert_eq!(
+        with(IlqrSettings {
+            iterations: 1,
+            last_gains: false,
+            target: Some(all.costs[1]),
+            ..base
+        }),
+        IlqrStop::Target
+    );
     let rest = Problem::new(3, Cost::default().running(terms::effort(1.0)));
     assert_eq!(solve(&simulator, &rest, &base).stop, IlqrStop::Stationary);
 }

@@ -93,7 +93,12 @@ pub(super) fn assemble(
         .filter_map(|b| shapes.radius(b))
         .reduce(f64::min)
         .unwrap_or(1.0);
-    let heaviest = bodies().map(|b| parameters.mass(b)).fold(0.0, f64::max);
+    // What is lighter than the water that it displaces presses, and moves, as that does.
+    let weight = |b: usize| {
+        let displaced = parameters.density() * parameters.volume(b);
+        parameters.mass(b).max(displaced)
+    };
+    let heaviest = bodies().map(weight).fold(0.0, f64::max);
     let stiffness = (given.stiffness).unwrap_or(STIFFNESS * heaviest / (dt * dt));
     if stiffness <= 0.0 {
         return Err(Error::input(

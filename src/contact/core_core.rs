@@ -14,6 +14,8 @@ pub const PARALLEL: f64 = 0.02;
 /// Share of the shorter edge over which a crossing fades out towards an end; at least as long as
 /// the overlap is deep, for less than that from the end the corner is the way out.
 pub(super) const END: f64 = 0.02;
+/// Cosines of the angle between a normal and the ways into a body from its corner between which the corner fades out.
+const BESIDE: [f64; 2] = [-0.6, -0.9];
 /// Sine of the angle by which the common normal may leave the normals of an edge's faces before
 /// the crossing has faded out.
 pub(super) const LEAVE: f64 = 0.05;
@@ -34,12 +36,12 @@ pub(super) fn contacts(
     let mut out = Vec::new();
     if a.is_ball() || !b.is_ball() {
         let limit = reach + a.radius + b.radius;
-        let field = |y: &Vec3| b.field(y, limit);
+        let field = |y: &Vec3, into: &[Vec3]| b.field_of_corner(y, into, limit);
         corners(a, a_at, (&field, b.radius), b_at, reach, |p| out.push(p));
     }
     if !a.is_ball() {
         let limit = reach + b.radius + a.radius;
-        let field = |y: &Vec3| a.field(y, limit);
+        let field = |y: &Vec3, into: &[Vec3]| a.field_of_corner(y, into, limit);
         corners(b, b_at, (&field, a.radius), a_at, reach, |p| {
             out.push(p.swapped())
         });
@@ -62,8 +64,8 @@ pub(super) fn contacts(
     out
 }
 
-/// Signed distances of points, where they are looked at.
-type Distances<'a> = &'a dyn Fn(&Vec3) -> Option<Field>;
+/// Signed distances of corners from which bodies lead into some directions, where they are looked at.
+type Distances<'a> = &'a dyn Fn(&Vec3, &[Vec3]) -> Option<Field>;
 
 /// Corners of `a`, which moves, against a body with a signed distance in its own frame and a radius about that.
 pub(super) fn corners(
@@ -76,16 +78,43 @@ pub(super) fn corners(
 ) {
     let to_b = b_at.inverse().compose(a_at);
     let radii = [a.radius, radius];
-    for corner in &a.corners {
-        let Some(field) = field(&to_b.apply(corner)) else {
+    let mut into = Vec::new();
+    for (corner, spokes) in a.corners.iter().zip(&a.spokes) {
+        into.clear();
+        // The ends of a capsule are round: they leave to all sides.
+        if !a.faces.is_empty() {
+            into.extend(spokes.iter().map(|d| to_b.rotation * d));
+        }
+        let Some(field) = field(&to_b.apply(corner), &into) else {
             continue;
         };
         let x = a_at.apply(corner);
-        let point = ContactPoint::probe(&x, &carry(&x), radii, &field.rotated(&b_at.rotation));
+        let mut point = ContactPoint::probe(&x, &carry(&x), radii, &field.rotated(&b_at.rotation));
         if point.gap < reach {
+            for d in &into {
+                point = beside(point, field.distance, &(b_at.rotation * d));
+            }
             found(point);
         }
     }
+}
+
+/// The point of a corner of the first body outside the second, from which that leads into the direction `into` (world frame), as far as it may touch there: where the body leads
+/// on against the normal the corner is beside what it stands on, and what crosses there touches.
+pub(super) fn beside(mut point: ContactPoint, distance: f64, into: &Vec3) -> ContactPoint {
+    let along = point.normal.dot(into);
+    if distance > 0.0 && along < BESIDE[0] {
+        let slope = point.slopes.normal.tr_mul(into) + rotate(into).tr_mul(&point.normal);
+        let width = BESIDE[0] - BESIDE[1];
+        let mut weight = Weight {
+            value: point.weight,
+            slope: point.slopes.weight,
+        };
+        weight.fade((along - BESIDE[1]) / width, &(slope / width));
+        point.weight = weight.value;
+        point.slopes.weight = weight.slope;
+    }
+    point
 }
 
 /// Edges of `a` that may be nearer to `b` than `beside`, world frame.

@@ -24,7 +24,7 @@ pub(super) fn against_plane(cylinder: &Cylinder, at: &Pose, wall: &HalfSpace) ->
         rim::lowest(at, found)
     };
     let mut out: Vec<_> = SIDES.into_iter().filter_map(end).collect();
-    let field = |x: &Vec3| Some(Field::flat(wall.height(x), wall.normal));
+    let field = |x: &Vec3, _: &[Vec3]| Some(Field::flat(wall.height(x), wall.normal));
     out.extend(rim::standing(cylinder, at, 0.0, field));
     out
 }
@@ -62,10 +62,14 @@ pub(super) fn contacts(
     }
     if !b.faces.is_empty() {
         let to_b = |x: &Vec3| b_at.apply_inverse(x);
-        let field = |x: &Vec3| Some(b.field(&to_b(x), reach + b.radius)?.rotated(&b_at.rotation));
+        let field = |x: &Vec3, into: &[Vec3]| {
+            let into: Vec<Vec3> = into.iter().map(|d| b_at.rotation.tr_mul(d)).collect();
+            let found = b.field_of_corner(&to_b(x), &into, reach + b.radius)?;
+            Some(found.rotated(&b_at.rotation))
+        };
         out.extend(rim::standing(a, a_at, b.radius, field));
     }
-    let field = |y: &Vec3| Some(a.field(y));
+    let field = |y: &Vec3, into: &[Vec3]| Some(a.field_of_corner(y, into));
     core_core::corners(b, b_at, (&field, 0.0), a_at, reach, |p| {
         out.push(p.swapped())
     });

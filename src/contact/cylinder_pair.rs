@@ -1,12 +1,12 @@
 //! A cylinder and another, or an ellipsoid.
 //!
 //! Two cylinders: of each, the point of either rim nearest to the other and the points of the rims that stay in place
-//! ([`super::rim`]), and where its rims come over those of the other ([`super::over_rim`]); and where the two cross side
+//! ([`super::rim`]), and where its rims, and its side lying across, come over those of the other ([`super::over_rim`]); and where the two cross side
 //! to side. An ellipsoid has the one point of its common normal with an end, a rim or the side.
 
 use super::core_core::{DEPTH, crossing};
 use super::cylinder::{line, thickness};
-use super::over_rim::{Rim, rim_over};
+use super::over_rim::{Rim, edge_over, rim_over};
 use super::point::ContactPoint;
 use super::rim::{self, SIDES, axis};
 use super::round_core::{SLACK, on_edge};
@@ -33,13 +33,15 @@ pub(super) fn contacts(
     let radii = [a.radius, b.radius];
     let depth = DEPTH * thickness(a).min(thickness(b));
     let shell = a.radius + b.radius;
-    out.extend(crossing(
-        &line(a, a_at),
-        &line(b, b_at),
-        radii,
-        shell,
-        depth,
-    ));
+    let (first, second) = (line(a, a_at), line(b, b_at));
+    out.extend(crossing(&first, &second, radii, shell, depth));
+    // A side that lies across an end, whose rims stand out on both sides.
+    for side in SIDES {
+        let over = edge_over(&first, a.radius, &Rim::new(b, b_at, side), reach, depth);
+        out.extend(over.into_iter().flatten());
+        let over = edge_over(&second, b.radius, &Rim::new(a, a_at, side), reach, depth);
+        out.extend(over.into_iter().flatten().map(ContactPoint::swapped));
+    }
     out.retain(|p| p.gap < reach && p.weight > 0.0);
     out
 }
@@ -53,7 +55,11 @@ fn rims(a: &Cylinder, a_at: &Pose, b: &Cylinder, b_at: &Pose, reach: f64) -> Vec
         rim::lowest(a_at, rim::shallow(found, depth))
     });
     let mut out: Vec<ContactPoint> = near.collect();
-    let field = |x: &Vec3| Some(b.field(&b_at.apply_inverse(x)).rotated(&b_at.rotation));
+    let field = |x: &Vec3, into: &[Vec3]| {
+        let into: Vec<Vec3> = into.iter().map(|d| b_at.rotation.tr_mul(d)).collect();
+        let found = b.field_of_corner(&b_at.apply_inverse(x), &into);
+        Some(found.rotated(&b_at.rotation))
+    };
     out.extend(rim::standing(a, a_at, 0.0, field));
     for side in SIDES {
         for other in SIDES {

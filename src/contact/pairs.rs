@@ -50,8 +50,8 @@ fn casing(pieces: &[ContactShape]) -> Option<Casing> {
 const AHEAD: f64 = 0.5;
 
 impl Contacts {
-    /// From the convex pieces of each body (one of a convex body, none of a body without surface), the walls, each of which any body may
-    /// come in contact with, and which bodies may with one another; each piece then may with each.
+    /// From the convex pieces of each body (one of a convex body, none of a body without surface), the walls, and which bodies may come in contact with one another and with
+    /// walls; each piece then may with each.
     ///
     /// # Errors
     /// A wall without a normal.
@@ -78,7 +78,7 @@ impl Contacts {
         (0..bodies).flat_map(move |a| {
             let later = a + 1..bodies;
             let others = later.filter(move |b| self.pairing.has(a, *b));
-            let walls = (0..self.walls.len()).map(Other::Wall);
+            let walls = self.walls_of(a).map(|(w, _)| Other::Wall(w));
             let others = others.map(Other::Body).chain(walls);
             others.flat_map(move |second| self.pieces_of(a, second))
         })
@@ -100,7 +100,7 @@ impl Contacts {
                     out.extend(self.pieces_of(a, Other::Body(b)));
                 }
             }
-            for (w, wall) in self.walls.iter().enumerate() {
+            for (w, wall) in self.walls_of(a) {
                 let far = |shape: &ContactShape| {
                     let ball = shape.ball_at(pose);
                     wall.height(&ball.center) - ball.radius >= 2.0 * reach(a)
@@ -128,11 +128,16 @@ impl Contacts {
         let (own, others): (Vec<usize>, Vec<usize>) = (0..self.shapes.len())
             .filter(|b| !self.shapes[*b].is_empty())
             .partition(|b| inside[*b]);
-        let meets = |a: usize| others.iter().any(|b| self.pairing.has(a, *b));
-        match self.walls.is_empty() {
-            true => own.into_iter().any(meets),
-            false => !own.is_empty(),
-        }
+        let meets = |a: usize| {
+            self.walls_of(a).next().is_some() || others.iter().any(|b| self.pairing.has(a, *b))
+        };
+        own.into_iter().any(meets)
+    }
+
+    /// The walls that a body may come in contact with, with their numbers.
+    fn walls_of(&self, body: usize) -> impl Iterator<Item = (usize, &HalfSpace)> {
+        let all = self.pairing.has_walls(body).then_some(&self.walls);
+        all.into_iter().flatten().enumerate()
     }
 
     /// The pairs of the pieces of a body and another, or a wall.

@@ -6,7 +6,7 @@
 //! those with a weight, and where it is zero all points of the rim are lowest. Of the points in place only those near the
 //! lowest one fade: the others say where a rim that rocks will land.
 
-use super::core_core::DEPTH_RAMP;
+use super::core_core::{DEPTH_RAMP, beside};
 use super::point::{ContactPoint, Rows3, carry, rotate};
 use super::weight::Weight;
 use crate::geometry::convex::{Cylinder, Field};
@@ -81,25 +81,31 @@ fn fixed(at: &Pose, out: &Vec3, mut point: ContactPoint) -> Option<ContactPoint>
             -(rotate(out).tr_mul(normal) + turned.tr_mul(out)) / sine - slope * (down / sine);
         replaced.fade(down / BESIDE, &(down_slope / BESIDE));
     }
-    point.weight = 1.0 - replaced.value;
-    point.slopes.weight = -replaced.slope;
+    let left = 1.0 - replaced.value;
+    point.slopes.weight = left * point.slopes.weight - point.weight * replaced.slope;
+    point.weight *= left;
     (point.weight > 0.0).then_some(point)
 }
 
 /// The points of both rims that stay in place, in the distance field (world frame) of the second body, which has `radius`
-/// about that.
+/// about that; it is told of the directions into the first as well.
 pub(super) fn standing(
     cylinder: &Cylinder,
     at: &Pose,
     radius: f64,
-    field: impl Fn(&Vec3) -> Option<Field>,
+    field: impl Fn(&Vec3, &[Vec3]) -> Option<Field>,
 ) -> Vec<ContactPoint> {
     let point = |side: f64, k: usize| {
         let (sin, cos) = (TAU * k as f64 / RIM_POINTS as f64).sin_cos();
         let (x, y) = (cylinder.radius * cos, cylinder.radius * sin);
         let x = at.apply(&Vec3::new(x, y, side * cylinder.half));
-        let found = ContactPoint::probe(&x, &carry(&x), [0.0, radius], &field(&x)?);
-        fixed(at, &(at.rotation * Vec3::new(cos, sin, 0.0)), found)
+        let out = at.rotation * Vec3::new(cos, sin, 0.0);
+        let into = [-out, -side * axis(at)];
+        let field = field(&x, &into)?;
+        let found = ContactPoint::probe(&x, &carry(&x), [0.0, radius], &field);
+        let [across, along] = &into;
+        let found = beside(beside(found, field.distance, across), field.distance, along);
+        fixed(at, &out, found)
     };
     let places = SIDES.map(|side| (0..RIM_POINTS).map(move |k| (side, k)));
     let places = places.into_iter().flatten();

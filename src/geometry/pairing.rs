@@ -11,6 +11,8 @@ pub struct Pairing {
     within: bool,
     /// Pairs that aren't, the lower number first.
     but: BTreeSet<(usize, usize)>,
+    /// Of each body whether it is looked at together with walls; all are where nothing is said.
+    at_walls: Vec<bool>,
 }
 
 impl Pairing {
@@ -25,6 +27,7 @@ impl Pairing {
             groups,
             within: false,
             but: BTreeSet::new(),
+            at_walls: Vec::new(),
         }
     }
 
@@ -42,6 +45,18 @@ impl Pairing {
         let sorted = pairs.into_iter().map(|(a, b)| (a.min(b), a.max(b)));
         self.but.extend(sorted);
         self
+    }
+
+    /// With walls for some bodies alone.
+    #[must_use]
+    pub fn at_walls(mut self, bodies: Vec<bool>) -> Self {
+        self.at_walls = bodies;
+        self
+    }
+
+    /// Whether a body is looked at together with walls.
+    pub fn has_walls(&self, body: usize) -> bool {
+        self.at_walls.get(body).copied().unwrap_or(true)
     }
 
     /// Whether bodies `a` and `b` are looked at together; no body is with itself, or with one that isn't there.

@@ -82,6 +82,8 @@ impl Rollout {
 struct Across<'a> {
     poses: &'a [Pose],
     body: usize,
+    /// Its number in the water.
+    number: usize,
     other: Option<usize>,
     /// Unit vector along which the body moves.
     direction: Vec3,
@@ -90,11 +92,19 @@ struct Across<'a> {
 impl<'a> Across<'a> {
     /// None where no motion changes the gap.
     fn new(simulator: &Simulator, poses: &'a [Pose], gap: &Gap) -> Option<Self> {
-        let volume = |b: usize| simulator.system().bodies[b].volume;
-        let (body, other) = match gap.second {
+        let system = simulator.system();
+        let volume = |b: usize| system.bodies[b].volume;
+        let number = |body: usize| system.submerged().position(|(b, _)| b == body);
+        let (smaller, other) = match gap.second {
             Other::Body(b) if volume(b) < volume(gap.first) => (b, Some(gap.first)),
             Other::Body(b) => (gap.first, Some(b)),
             Other::Wall(_) => (gap.first, None),
+        };
+        // What nothing moves isn't in the water where bodies don't feel each other.
+        let (body, other, number) = match (number(smaller), other) {
+            (Some(number), other) => (smaller, other, number),
+            (None, Some(b)) => (b, Some(smaller), number(b)?),
+            (None, None) => return None,
         };
         let step = STEP * gap.edge;
         let distance = |shift: Vec3| {
@@ -110,6 +120,7 @@ impl<'a> Across<'a> {
         Some(Self {
             poses,
             body,
+            number,
             other,
             direction: Vec3::from_fn(|axis, _| slope(axis)).try_normalize(0.0)?,
         })
@@ -120,7 +131,7 @@ impl<'a> Across<'a> {
         let system = simulator.system();
         let in_water: Vec<usize> = system.submerged().map(|(b, _)| b).collect();
         let poses: Vec<Pose> = in_water.iter().map(|b| self.poses[*b]).collect();
-        let own = in_water.iter().position(|b| *b == self.body).unwrap_or(0);
+        let own = self.number;
         let mut twist = DMatrix::zeros(6 * poses.len(), 1);
         let along = self.poses[self.body].rotation.tr_mul(&self.direction);
         twist.fixed_view_mut::<3, 1>(6 * own, 0).copy_from(&along);

@@ -6,7 +6,7 @@ use crate::adjoint::lie::{Pose, Vec6, six};
 use crate::assembly::bearing;
 use crate::coupling::lubrication::PlacedBearing;
 use crate::dynamics::Drive;
-use crate::geometry::{Gap, Other};
+use crate::geometry::{Gap, Other, WallSurface};
 use crate::scene::WATER_VISCOSITY;
 use nalgebra::{DVector, Vector3};
 use serde::Serialize;
@@ -55,7 +55,7 @@ impl GapFlow {
 
 impl Rollout {
     /// Which of inertia and viscosity rules the water in the smallest gap of the trajectory, whether or not viscous water acts there. None where there is no gap, no
-    /// water, and where surfaces overlap.
+    /// water, at a free surface, and where surfaces overlap.
     ///
     /// # Errors
     /// A mesh file that can't be read any more; whatever evaluating the system reports.
@@ -65,7 +65,10 @@ impl Rollout {
         let Some((at, gap)) = self.nearest() else {
             return Ok(None);
         };
-        if density <= 0.0 || gap.distance <= 0.0 {
+        // A free surface gives way.
+        let free = |w: usize| simulator.scene.walls[w].surface == WallSurface::Free;
+        let yields = matches!(gap.second, Other::Wall(w) if free(w));
+        if density <= 0.0 || gap.distance <= 0.0 || yields {
             return Ok(None);
         }
         let h = gap.distance;
@@ -80,8 +83,13 @@ impl Rollout {
             .flatten()
             .map(String::as_str)
             .collect();
+        let carriers = simulator.scene.carriers();
+        let neighbours = match gap.second {
+            Other::Body(b) => carriers.are_neighbours(gap.first, b),
+            Other::Wall(_) => false,
+        };
         let mut forces = simulator.scene.lubrications();
-        let acting = forces.find(|(_, force)| force.acts_between(&names));
+        let acting = forces.find(|(_, force)| !neighbours && force.acts_between(&names));
         let any = acting.or_else(|| simulator.scene.lubrications().next());
         let value = |(i, _): (usize, _), what: &str| {
             let name = format!("{}.{what}", simulator.scene.force_name(i));

@@ -55,6 +55,8 @@ pub(crate) struct Clearance {
 }
 
 /// The nearest joint that moves each body: those with the same one don't move relative to one another.
+const WORLD: usize = usize::MAX;
+
 fn movers(scene: &Scene, tree: &Tree) -> Vec<usize> {
     let mut out: Vec<usize> = Vec::with_capacity(scene.bodies.len());
     for (b, (body, link)) in scene.bodies.iter().zip(tree.links()).enumerate() {
@@ -62,8 +64,7 @@ fn movers(scene: &Scene, tree: &Tree) -> Vec<usize> {
         out.push(match (link.columns.is_empty() || held, link.parent) {
             (false, _) => b,
             (true, Some(parent)) => out[parent],
-            // The world.
-            (true, None) => usize::MAX,
+            (true, None) => WORLD,
         });
     }
     out
@@ -82,10 +83,13 @@ impl Clearance {
         let (shares, movers) = (shares.collect::<Vec<_>>(), movers(scene, tree));
         let solids: Vec<_> = surfaces.iter().map(|s| s.as_ref()?.solid.clone()).collect();
         let all = Gaps::new(&meshes, &[], &[])?.by_formula(solids)?;
+        // What rests in the world stays as far from walls as it is.
+        let rests: Vec<bool> = movers.iter().map(|mover| *mover == WORLD).collect();
+        let goes = rests.iter().map(|rests| !rests).collect();
         let rigid = Pairing::within(movers.clone()).but(declared.clone());
-        let moving = Pairing::between(movers).but(declared);
+        let moving = Pairing::between(movers).but(declared).at_walls(goes);
         Ok(Self {
-            rigid: all.paired(&[], rigid)?,
+            rigid: all.paired(&scene.walls, rigid.at_walls(rests))?,
             moving: all.paired(&scene.walls, moving)?,
             declared: shares.into_iter().flatten().collect(),
             parents: (0..bodies).map(|b| carriers.submerged_parent(b)).collect(),

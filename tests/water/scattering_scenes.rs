@@ -163,14 +163,14 @@ fn alone_a_body_has_what_is_given() {
     }
 }
 
-/// A shoal between a floor and a free surface.
+/// A shoal beside a wall and under a free surface.
 fn shoal() -> Scene {
     let mut scene = Scene::new(Fluid {
         current: [0.1, -0.05, 0.0],
         ..Fluid::fresh_water()
     });
     scene.gravity = [0.0, 0.0, -9.81];
-    scene.add_wall([0.0, 0.0, -0.45], [0.0, 0.0, 1.0]);
+    scene.add_wall([0.0, -0.3, 0.0], [0.0, 1.0, 0.0]);
     scene.walls.push(Wall {
         surface: WallSurface::Free,
         ..Wall::rigid([0.0, 0.0, 0.5], [0.0, 0.0, -1.0])

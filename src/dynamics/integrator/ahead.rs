@@ -253,15 +253,18 @@ impl Stepper<'_> {
     }
 
     /// What is passed by a step from `e` that moves by `v`: surfaces that get so deep that they might come out on the other side, or so near that there is no
-    /// water left between them, and joints that get past their limit by a part of their range. Where the stiffness was given, that is as it was asked for.
+    /// water left between them, and joints that get past their limit by a part of their range. Where the stiffness was given, what presses sinks in as it was asked for; what
+    /// comes by unseen is met.
     pub(super) fn passed(&self, e: &Evaluation, v: &DVector<f64>) -> Stops {
         let mut out = Stops::default();
         let (system, dt) = (self.system, self.dt);
-        if let Some(model) = system.contact.as_ref().filter(|m| m.rigid) {
+        if let Some(model) = &system.contact {
+            let pressed = |k: &ContactPair| e.contact_points.iter().any(|c| c.pair == *k);
+            let wet = model.rigid && model.wet;
             let way = Way::new(system, &e.q, v);
             let twists = system.tree.twists(&e.kinematics, v);
             let mut near = met_within(model, &e.kinematics.poses, &twists, dt);
-            if model.wet {
+            if wet {
                 let end = &way.end.get_or_init(|| way.at(dt)).0;
                 near.extend(model.near(end, |_| 0.0));
                 near.sort_unstable();
@@ -269,7 +272,10 @@ impl Stepper<'_> {
             }
             for k in &near {
                 let shapes = &model.shapes;
-                if model.wet && closed(&way, model, k, dt) {
+                if !model.rigid && pressed(k) {
+                    continue;
+                }
+                if wet && closed(&way, model, k, dt) {
                     out.pairs.push(*k);
                     continue;
                 }

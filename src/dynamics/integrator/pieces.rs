@@ -48,7 +48,12 @@ impl<'a> Stepper<'a> {
                     return Ok((next, record));
                 }
                 Ok((_, record)) => {
-                    plan.sharp.add(&record.passed);
+                    let mut passed = record.passed;
+                    // A stiffness that was given stays what it is.
+                    if self.system.contact.as_ref().is_some_and(|m| !m.rigid) {
+                        passed.pairs.clear();
+                    }
+                    plan.sharp.add(&passed);
                     plan.cut(2);
                 }
                 Err(Halt::TooLong(times)) => plan.cut(times),

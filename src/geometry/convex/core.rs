@@ -1,9 +1,17 @@
 //! Corners, edges and faces, with a radius about them: balls, capsules and convex polyhedra.
 
-use super::field::Field;
+use super::field::{Field, leaves};
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use std::collections::BTreeMap;
+
+/// Height over a face, and the face.
+type Over<'f> = (f64, &'f Face);
+
+/// The higher of two, of equal ones the first.
+fn higher<'f>(best: Over<'f>, next: Over<'f>) -> Over<'f> {
+    if best.0 >= next.0 { best } else { next }
+}
 
 /// Share of a core's size below which a distance is rounding.
 const ROUNDING: f64 = 1e-13;
@@ -183,19 +191,25 @@ impl Core {
     /// Signed distance of a point from the core, without the radius; none beyond `limit`. Inside,
     /// it is that to the nearest face.
     pub fn field(&self, p: &Vec3, limit: f64) -> Option<Field> {
+        self.field_of_corner(p, &[], limit)
+    }
+
+    /// The same of the corner of another body, which it leaves `into` these directions (unit vectors): inside, it is that to the nearest face through which the other
+    /// body may leave.
+    pub fn field_of_corner(&self, p: &Vec3, into: &[Vec3], limit: f64) -> Option<Field> {
         let beside = (self.bounds[0] - p).sup(&(p - self.bounds[1]));
         if beside.max() > limit {
             return None;
         }
         let least = ROUNDING * self.diameter().max(p.amax());
         let heights = self.faces.iter().map(|f| (f.normal.dot(p) - f.offset, f));
-        let highest = heights.clone();
-        let highest = highest.reduce(|best, next| if best.0 >= next.0 { best } else { next });
-        if let Some((height, face)) = highest {
+        if let Some((height, face)) = heights.clone().reduce(higher) {
             if height > limit {
                 return None;
             }
             if height <= least {
+                let leaving = heights.filter(|(_, f)| leaves(&f.normal, into));
+                let (height, face) = leaving.reduce(higher).unwrap_or((height, face));
                 return Some(Field::flat(height, face.normal));
             }
         }

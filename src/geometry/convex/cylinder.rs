@@ -1,6 +1,6 @@
 //! Circular cylinders and the discs at their ends: support points and signed distances.
 
-use super::field::{Field, across, perpendicular};
+use super::field::{Field, across, leaves, perpendicular};
 use super::round::{Approach, Round, Support};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
@@ -47,19 +47,34 @@ impl Cylinder {
 
     /// Signed distance of a point, frame of the cylinder: inside, from the nearer of side and ends.
     pub fn field(&self, y: &Vec3) -> Field {
+        self.field_of_corner(y, &[])
+    }
+
+    /// The same of the corner of another body, which it leaves `into` these directions (unit vectors): inside, from the nearer of those through which the other body may leave.
+    pub fn field_of_corner(&self, y: &Vec3, into: &[Vec3]) -> Field {
         let aside = y.x.hypot(y.y);
         let (beside, above) = (aside - self.radius, y.z.abs() - self.half);
         let up = Vec3::new(0.0, 0.0, 1f64.copysign(y.z));
         if beside > 0.0 && above > 0.0 {
             return rim(y, aside, beside, above, &up, ROUNDING * self.radius);
         }
-        if above >= beside {
+        let within = beside <= 0.0 && above <= 0.0;
+        let on_axis = aside <= ROUNDING * self.radius;
+        let gradient = match on_axis {
+            true => Vec3::x(),
+            false => Vec3::new(y.x, y.y, 0.0) / aside,
+        };
+        let by_end = match (leaves(&up, into), leaves(&gradient, into)) {
+            (true, false) if within => true,
+            (false, true) if within => false,
+            _ => above >= beside,
+        };
+        if by_end {
             return Field::flat(above, up);
         }
-        if aside <= ROUNDING * self.radius {
-            return Field::flat(beside, Vec3::x());
+        if on_axis {
+            return Field::flat(beside, gradient);
         }
-        let gradient = Vec3::new(y.x, y.y, 0.0) / aside;
         let around = up.cross(&gradient);
         Field {
             distance: beside,

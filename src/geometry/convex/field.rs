@@ -51,6 +51,15 @@ impl Field {
     }
 }
 
+/// Sine of the angle by which a corner's edges may lean against a way out.
+const AGAINST: f64 = 0.5;
+
+/// Whether a body may leave along a normal by a corner from which it leads `into` these directions: where bodies are flush the nearest face of one may be a side that the other
+/// stands across.
+pub(super) fn leaves(normal: &Vec3, into: &[Vec3]) -> bool {
+    into.iter().all(|d| normal.dot(d) >= -AGAINST)
+}
+
 /// `I − n nᵀ`.
 pub(crate) fn across(n: &Vec3) -> Mat3 {
     Mat3::identity() - n * n.transpose()

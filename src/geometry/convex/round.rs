@@ -50,7 +50,7 @@ pub(crate) trait Round {
 }
 
 /// Where the signed distance from a convex body is least along an edge: how far from its beginning, m, looked for from
-/// `first` on; none at an end. It is convex, so its slope along the edge has one root at most.
+/// `first` on; none at an end, unless it is level there. It is convex, so its slope along the edge has one root at most.
 pub(super) fn lowest(
     field: &dyn Fn(&Vec3) -> Field,
     from: &Vec3,
@@ -63,7 +63,14 @@ pub(super) fn lowest(
         let curvature = along.dot(&(field.hessian * along));
         (field.gradient.dot(along), curvature)
     };
-    if slope(0.0).0 >= 0.0 || slope(length).0 <= 0.0 {
+    let ends = [slope(0.0), slope(length)];
+    // Level at an end, and rising from there: bodies that stand flush.
+    for (s, (value, curvature)) in [0.0, length].into_iter().zip(ends) {
+        if value == 0.0 && curvature > 0.0 {
+            return Some(s);
+        }
+    }
+    if ends[0].0 >= 0.0 || ends[1].0 <= 0.0 {
         return None;
     }
     let (mut low, mut high) = (0.0, length);

@@ -171,9 +171,21 @@ impl Gaps {
         submerged().flat_map(move |i| {
             let bodies = submerged().skip_while(move |j| *j <= i);
             let bodies = bodies.filter(move |j| self.pairing.has(i, *j));
-            let walls = (0..self.walls.len()).map(Other::Wall);
-            bodies.map(Other::Body).chain(walls).map(move |o| (i, o))
+            bodies
+                .map(Other::Body)
+                .chain(self.walls_of(i))
+                .map(move |o| (i, o))
         })
+    }
+
+    /// The walls that a body is looked at together with.
+    fn walls_of(&self, body: usize) -> impl Iterator<Item = Other> + use<> {
+        let walls = if self.pairing.has_walls(body) {
+            self.walls.len()
+        } else {
+            0
+        };
+        (0..walls).map(Other::Wall)
     }
 
     /// [`Gap::edge`] is no more than this, m.

@@ -95,8 +95,7 @@ impl Gaps {
             let own = std::iter::from_fn(|| bodies.next_if(|(first, _)| *first == i));
             let own = own.filter(|(_, j)| self.pairing.has(i, *j));
             let others = own.map(|(_, j)| Other::Body(j));
-            let walls = (0..self.walls.len()).map(Other::Wall);
-            for pair in others.chain(walls).map(|other| (i, other)) {
+            for pair in others.chain(self.walls_of(i)).map(|other| (i, other)) {
                 let bound = self.bound(balls, pair).filter(|b| *b < distance);
                 let bound = bound.map(|b| b.max(self.apart(poses, pair)));
                 if let Some(bound) = bound.filter(|b| *b < distance) {

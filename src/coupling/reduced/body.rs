@@ -2,7 +2,7 @@
 
 use super::region::Region;
 use crate::adjoint::kernel::Points;
-use crate::adjoint::lie::{Mat6, Vec3};
+use crate::adjoint::lie::{Mat6, Vec3, Vec6, angular, linear};
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -185,9 +185,11 @@ impl ReducedBody {
         &self.targets
     }
 
-    /// Volume of the water that the body moves, m³, and the reach of its turns, m.
-    pub(super) fn scales(&self) -> (f64, f64) {
-        scales(&self.parts)
+    /// Twice the energy, at unit density, that as much water as the body moves would have at most if it went with a twist.
+    pub(in crate::coupling) fn displaced(&self, twist: &Vec6) -> f64 {
+        let (mass, arm) = scales(&self.parts);
+        let speed = linear(twist).norm() + arm * angular(twist).norm();
+        mass * speed * speed
     }
 
     /// What the body's own added mass is below zero by, scaled by the water displaced: the one-body method's
@@ -197,6 +199,7 @@ impl ReducedBody {
     }
 }
 
+/// Volume of the water that the body moves, m³, and the reach of its turns, m.
 fn scales(p: &CompressedParts) -> (f64, f64) {
     let linear = p.added_mass.fixed_view::<3, 3>(0, 0).trace();
     (p.volume.max(linear), p.radius + p.centre.norm())

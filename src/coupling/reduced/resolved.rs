@@ -93,13 +93,8 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
     let own: Vec<f64> = (0..k)
         .map(|i| {
             let bodies = reduced.bodies.iter().enumerate();
-            let inertia = bodies.map(|(b, body)| {
-                let (mass, arm) = body.scales();
-                let twist = basis.fixed_view::<6, 1>(6 * b, i);
-                let (u, w) = (twist.fixed_rows::<3>(0), twist.fixed_rows::<3>(3));
-                let scale = u.norm() + arm * w.norm();
-                mass * scale * scale
-            });
+            let inertia = bodies
+                .map(|(b, body)| body.displaced(&basis.fixed_view::<6, 1>(6 * b, i).into_owned()));
             inertia.sum::<f64>()
         })
         .collect();

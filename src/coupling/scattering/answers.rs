@@ -7,6 +7,7 @@ use super::Scattering;
 use super::kept::{Answer, Kept, Near, Told};
 use super::levels::Levels;
 use super::scattered::{Scattered, plus};
+use crate::adjoint::lie::Vec6;
 use crate::coupling::CouplingReport;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::settings::met;
@@ -28,6 +29,12 @@ const ASKED: f64 = 0.3;
 /// Coarsest relative residual of a solve whose absolute one is asked for.
 const COARSE: f64 = 1e-2;
 
+/// Below zero, in the energy of the water displaced, that of the water shows that there is no flow: levels leave out less.
+const NEGATIVE: f64 = 1e-3;
+/// What to do where compressed bodies aren't resolved.
+const UNRESOLVED: &str = "bodies are nearer than their compressed sources resolve, or overlap: keep them apart by contact, let films stand in their gaps, or give a smaller \
+                          resolved_gap";
+
 /// What [`Scattered::recoil`] finds.
 #[derive(Clone, Debug)]
 pub struct Recoiled {
@@ -46,6 +53,17 @@ impl Recoiled {
     /// What the modes do.
     pub(super) fn modes(&self) -> &[f64] {
         &self.modes
+    }
+
+    /// As an answer to these twists.
+    fn told(self, twists: DVector<f64>) -> Told {
+        Told {
+            exchanged: self.exchanged,
+            twists,
+            solved: self.twists,
+            modes: self.modes,
+            left: self.lacked,
+        }
     }
 }
 
@@ -117,6 +135,23 @@ impl Scattered<'_> {
         if let Some(lost) = kept.lost.take() {
             return Err(lost);
         }
+        if let Some(energy) = kept.negative {
+            return Err(Error::Unresolved {
+                place: match self.nearest() {
+                    Some([a, b]) => format!(
+                        "body {:?} and body {:?}, the nearest of {}",
+                        self.model.names[a],
+                        self.model.names[b],
+                        self.model.names.len()
+                    ),
+                    None => "exchange between many bodies".into(),
+                },
+                quantity: "energy of the water, in that of the water displaced".into(),
+                value: energy,
+                limit: 0.0,
+                remedy: UNRESOLVED.into(),
+            });
+        }
         match kept.failed {
             None => Ok(()),
             Some((iterations, residual)) => Err(Error::Solver {
@@ -132,9 +167,7 @@ impl Scattered<'_> {
                 iterations,
                 residual,
                 tolerance: self.model.levels.tolerance,
-                remedy: "bodies are nearer than their compressed sources resolve, or overlap: keep them \
-                         apart by contact, or give a smaller resolved_gap"
-                    .into(),
+                remedy: UNRESOLVED.into(),
             }),
         }
     }
@@ -305,13 +338,31 @@ impl Scattered<'_> {
             }
         };
         let left = plus(&modes, -1.0, &seen);
-        self.keep(Told {
+        let told = Told {
             exchanged,
             twists: twists.clone(),
             solved: twists.clone(),
             modes,
             left,
-        })
+        };
+        self.look(&told);
+        self.keep(told)
+    }
+
+    /// Looks whether the water has energy: a search finds solutions of systems that have no sense as well.
+    fn look(&self, told: &Told) {
+        let (mut own, mut displaced) = (0.0, 0.0);
+        // What the shapes have, whatever is given in the place of it.
+        for (b, body) in self.model.bodies.iter().enumerate() {
+            let twist: Vec6 = told.twists.fixed_rows::<6>(6 * b).into_owned();
+            own += twist.dot(&(body.parts().added_mass * twist));
+            displaced += body.displaced(&twist);
+        }
+        let energy = own + told.twists.dot(&told.exchanged);
+        if energy < -NEGATIVE * displaced {
+            let mut kept = self.kept();
+            kept.negative.get_or_insert(energy / displaced);
+        }
     }
 
     fn keep(&self, told: impl Into<Arc<Told>>) -> Arc<Answer> {
@@ -414,18 +465,15 @@ impl Scattered<'_> {
 
     /// Keeps what recoiled as the answer to the twists that follow from it.
     pub fn settle(&self, twists: DVector<f64>, recoiled: Recoiled) -> Arc<Answer> {
-        self.keep(Told {
-            exchanged: recoiled.exchanged,
-            twists,
-            solved: recoiled.twists,
-            modes: recoiled.modes,
-            left: recoiled.lacked,
-        })
+        let told = recoiled.told(twists);
+        self.look(&told);
+        self.keep(told)
     }
 
     /// Keeps what recoiled as it is, to know more of what is near it.
     pub fn remember(&self, recoiled: Recoiled) {
-        self.settle(recoiled.twists.clone(), recoiled);
+        let twists = recoiled.twists.clone();
+        self.keep(recoiled.told(twists));
     }
 }
 

@@ -52,8 +52,7 @@ pub(super) fn assemble(
                 // Without friction any speed will do.
                 stiction_speed: 1.0,
                 stiction_spin: 1.0,
-                // The force sets in at the end, not before: a joint may rest there.
-                gap: -WIDTH * (range[1] - range[0]),
+                gap: 0.0,
                 width: WIDTH * (range[1] - range[0]),
                 horizon: dt,
             },

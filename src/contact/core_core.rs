@@ -5,7 +5,7 @@
 
 use super::point::{ContactPoint, Rows3, Slopes, carry, rotate};
 use super::weight::Weight;
-use crate::geometry::convex::{Core, Edge, Field, across};
+use crate::geometry::convex::{AtCorner, Core, Edge, across};
 use hydrograd_adjoint::lie::{Pose, Vec3, skew};
 
 /// Sine of the angle between two edges below which they have no contact point across one another; the
@@ -65,7 +65,7 @@ pub(super) fn contacts(
 }
 
 /// Signed distances of corners from which bodies lead into some directions, where they are looked at.
-type Distances<'a> = &'a dyn Fn(&Vec3, &[Vec3]) -> Option<Field>;
+type Distances<'a> = &'a dyn Fn(&Vec3, &[Vec3]) -> Option<AtCorner>;
 
 /// Corners of `a`, which moves, against a body with a signed distance in its own frame and a radius about that.
 pub(super) fn corners(
@@ -85,25 +85,26 @@ pub(super) fn corners(
         if !a.faces.is_empty() {
             into.extend(spokes.iter().map(|d| to_b.rotation * d));
         }
-        let Some(field) = field(&to_b.apply(corner), &into) else {
+        let Some(at_corner) = field(&to_b.apply(corner), &into) else {
             continue;
         };
         let x = a_at.apply(corner);
-        let mut point = ContactPoint::probe(&x, &carry(&x), radii, &field.rotated(&b_at.rotation));
+        let seen = at_corner.field.rotated(&b_at.rotation);
+        let mut point = ContactPoint::probe(&x, &carry(&x), radii, &seen);
         if point.gap < reach {
-            for d in &into {
-                point = beside(point, field.distance, &(b_at.rotation * d));
+            for d in into.iter().filter(|_| at_corner.over) {
+                point = beside(point, &(b_at.rotation * d));
             }
             found(point);
         }
     }
 }
 
-/// The point of a corner of the first body outside the second, from which that leads into the direction `into` (world frame), as far as it may touch there: where the body leads
-/// on against the normal the corner is beside what it stands on, and what crosses there touches.
-pub(super) fn beside(mut point: ContactPoint, distance: f64, into: &Vec3) -> ContactPoint {
+/// The point of a corner of the first body over a face of the second, from which the first leads into the direction `into` (world frame), as far as it may touch there: where it leads
+/// on through the face the corner is beside what the body stands on, and what crosses there touches.
+pub(super) fn beside(mut point: ContactPoint, into: &Vec3) -> ContactPoint {
     let along = point.normal.dot(into);
-    if distance > 0.0 && along < BESIDE[0] {
+    if along < BESIDE[0] {
         let slope = point.slopes.normal.tr_mul(into) + rotate(into).tr_mul(&point.normal);
         let width = BESIDE[0] - BESIDE[1];
         let mut weight = Weight {

@@ -14,7 +14,7 @@ use super::rim::{self, SIDES, axis};
 use super::sunk::sunk;
 use super::{plane, round_core};
 use crate::geometry::HalfSpace;
-use crate::geometry::convex::{Core, Cylinder, Edge, Field};
+use crate::geometry::convex::{AtCorner, Core, Cylinder, Edge};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// The points against a wall.
@@ -24,7 +24,7 @@ pub(super) fn against_plane(cylinder: &Cylinder, at: &Pose, wall: &HalfSpace) ->
         rim::lowest(at, found)
     };
     let mut out: Vec<_> = SIDES.into_iter().filter_map(end).collect();
-    let field = |x: &Vec3, _: &[Vec3]| Some(Field::flat(wall.height(x), wall.normal));
+    let field = |x: &Vec3, _: &[Vec3]| Some(AtCorner::flat(wall.height(x), wall.normal));
     out.extend(rim::standing(cylinder, at, 0.0, field));
     out
 }

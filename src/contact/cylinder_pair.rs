@@ -6,7 +6,7 @@
 
 use super::core_core::{DEPTH, crossing};
 use super::cylinder::{line, thickness};
-use super::over_rim::{Rim, edge_over, rim_over};
+use super::over_rim::{Rim, rim_over, side_over};
 use super::point::ContactPoint;
 use super::rim::{self, SIDES, axis};
 use super::round_core::{SLACK, on_edge};
@@ -37,9 +37,9 @@ pub(super) fn contacts(
     out.extend(crossing(&first, &second, radii, shell, depth));
     // A side that lies across an end, whose rims stand out on both sides.
     for side in SIDES {
-        let over = edge_over(&first, a.radius, &Rim::new(b, b_at, side), reach, depth);
+        let over = side_over(&first, a.radius, &Rim::new(b, b_at, side), reach, depth);
         out.extend(over.into_iter().flatten());
-        let over = edge_over(&second, b.radius, &Rim::new(a, a_at, side), reach, depth);
+        let over = side_over(&second, b.radius, &Rim::new(a, a_at, side), reach, depth);
         out.extend(over.into_iter().flatten().map(ContactPoint::swapped));
     }
     out.retain(|p| p.gap < reach && p.weight > 0.0);

@@ -19,7 +19,7 @@
 //! are left may be farther, by at most 0.03 of the shorter edge.
 //!
 //! # How smooth
-//! A corner that lies beside what its body stands on, the normal pointing across the body, fades out with continuous slope. Outside a body its distance has a continuous gradient, and so have gap and position; the normal
+//! A corner over a face through which its own body leads on is beside what that stands on, and fades out. Outside a body its distance has a continuous gradient, and so have gap and position; the normal
 //! is continuous and rotates the faster the nearer a corner or edge of one body is to one of the other.
 //! Inside a polyhedron the distance of a corner is that to the nearest face through which its body may leave (of flush bodies not the sides), and the normal jumps where the
 //! nearest face changes, by the angle between the two; so it does inside a cylinder. The point where two edges cross fades out,

@@ -41,6 +41,8 @@ impl Rim {
 /// A point of a curve of the first body that is over the rim.
 struct Over {
     x: Vec3,
+    /// How it moves with its body at its place on the curve.
+    carried: Rows3,
     /// Unit tangent of the curve.
     along: Vec3,
     /// Second derivative of the curve, 1/m.
@@ -58,7 +60,7 @@ impl Over {
         let flat = across(&rim.out);
         let outward = flat * (self.x - rim.center) / rim.radius;
         let through = outward.dot(&self.along);
-        let carried = carry(&self.x);
+        let carried = self.carried;
         let along_slope = -carried.tr_mul(&outward) / through;
         let motion: Rows3 = carried + self.along * along_slope.transpose();
         let field = Field::flat(height, rim.out);
@@ -93,6 +95,45 @@ pub(super) fn edge_over(
     reach: f64,
     depth: f64,
 ) -> [Option<ContactPoint>; 2] {
+    line_over((edge, carry), radius, rim, reach, depth)
+}
+
+/// The same of a cylinder's side about this axis: of the line on it that is lowest over the end.
+pub(super) fn side_over(
+    axis: &Edge,
+    radius: f64,
+    rim: &Rim,
+    reach: f64,
+    depth: f64,
+) -> [Option<ContactPoint>; 2] {
+    let lean = axis.along.dot(&rim.out);
+    if lean.abs() >= TILT {
+        return [None, None];
+    }
+    // m = (n − e (e · n))/√(1 − (e · n)²), and how it turns with e.
+    let sine = (1.0 - lean * lean).sqrt();
+    let up = (rim.out - lean * axis.along) / sine;
+    let turned = rotate(&axis.along);
+    let leaning = turned.tr_mul(&rim.out);
+    let up_slope: Rows3 =
+        across(&up) * (axis.along * leaning.transpose() + lean * turned) * (-1.0 / sine);
+    let line = Edge {
+        from: axis.from - radius * up,
+        inward: None,
+        ..axis.clone()
+    };
+    let carried = |x: &Vec3| carry(&(x + radius * up)) - radius * up_slope;
+    line_over((&line, carried), 0.0, rim, reach, depth)
+}
+
+/// Of an edge, and how its points move.
+fn line_over(
+    (edge, carried): (&Edge, impl Fn(&Vec3) -> Rows3),
+    radius: f64,
+    rim: &Rim,
+    reach: f64,
+    depth: f64,
+) -> [Option<ContactPoint>; 2] {
     let lean = edge.along.dot(&rim.out);
     if lean.abs() >= TILT {
         return [None, None];
@@ -110,8 +151,10 @@ pub(super) fn edge_over(
         if ends.iter().any(|x| *x <= 0.0) {
             return None;
         }
+        let x = edge.from + s * edge.along;
         let over = Over {
-            x: edge.from + s * edge.along,
+            carried: carried(&x),
+            x,
             along: edge.along,
             bend: Vec3::zeros(),
         };
@@ -175,8 +218,10 @@ pub(super) fn rim_over(
         }
         let (sin, cos) = angle.sin_cos();
         let out = cos * u + sin * v;
+        let x = moving.center + moving.radius * out;
         let over = Over {
-            x: moving.center + moving.radius * out,
+            carried: carry(&x),
+            x,
             along: cos * v - sin * u,
             bend: -out / moving.radius,
         };

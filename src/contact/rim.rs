@@ -9,7 +9,7 @@
 use super::core_core::{DEPTH_RAMP, beside};
 use super::point::{ContactPoint, Rows3, carry, rotate};
 use super::weight::Weight;
-use crate::geometry::convex::{Cylinder, Field};
+use crate::geometry::convex::{AtCorner, Cylinder};
 use hydrograd_adjoint::lie::{Pose, Vec3, Vec6, skew};
 use std::f64::consts::TAU;
 
@@ -93,7 +93,7 @@ pub(super) fn standing(
     cylinder: &Cylinder,
     at: &Pose,
     radius: f64,
-    field: impl Fn(&Vec3, &[Vec3]) -> Option<Field>,
+    field: impl Fn(&Vec3, &[Vec3]) -> Option<AtCorner>,
 ) -> Vec<ContactPoint> {
     let point = |side: f64, k: usize| {
         let (sin, cos) = (TAU * k as f64 / RIM_POINTS as f64).sin_cos();
@@ -101,10 +101,11 @@ pub(super) fn standing(
         let x = at.apply(&Vec3::new(x, y, side * cylinder.half));
         let out = at.rotation * Vec3::new(cos, sin, 0.0);
         let into = [-out, -side * axis(at)];
-        let field = field(&x, &into)?;
-        let found = ContactPoint::probe(&x, &carry(&x), [0.0, radius], &field);
-        let [across, along] = &into;
-        let found = beside(beside(found, field.distance, across), field.distance, along);
+        let at_corner = field(&x, &into)?;
+        let mut found = ContactPoint::probe(&x, &carry(&x), [0.0, radius], &at_corner.field);
+        for d in into.iter().filter(|_| at_corner.over) {
+            found = beside(found, d);
+        }
         fixed(at, &out, found)
     };
     let places = SIDES.map(|side| (0..RIM_POINTS).map(move |k| (side, k)));

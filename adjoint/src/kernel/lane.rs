@@ -26,6 +26,8 @@ pub(crate) trait Lane:
     fn atan2(self, x: Self) -> Self;
     /// The nearest number from 0 to 1.
     fn clamp_unit(self) -> Self;
+    /// The number, or `bound` where it is below that.
+    fn at_least(self, bound: f64) -> Self;
     /// Whether a number in any lane is below `bound`.
     fn any_below(self, bound: f64) -> bool;
 }
@@ -59,6 +61,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn clamp_unit(self) -> Self {
         self.clamp(0.0, 1.0)
+    }
+    #[inline(always)]
+    fn at_least(self, bound: f64) -> Self {
+        self.max(bound)
     }
     #[inline(always)]
     fn any_below(self, bound: f64) -> bool {
@@ -238,6 +244,11 @@ impl<S: Simd> Lane for Lanes<S> {
         let simd = self.simd;
         let above = simd.max_f64s(self.v, self.like(0.0).v);
         Self::new(simd, simd.min_f64s(above, self.like(1.0).v))
+    }
+    #[inline(always)]
+    fn at_least(self, bound: f64) -> Self {
+        let simd = self.simd;
+        Self::new(simd, simd.max_f64s(self.v, self.like(bound).v))
     }
     #[inline(always)]
     fn any_below(self, bound: f64) -> bool {

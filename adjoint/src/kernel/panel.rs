@@ -325,9 +325,15 @@ impl Panel {
         if !(-squared).any_below(-self.reach[0]) {
             return near;
         }
-        let far = L::far(self, &self.multipoles(r, squared));
+        let far = L::far(self, &self.beyond(r, squared));
         let w = Weight::new(squared, self.reach);
         w.value.mul_add(near - far, far)
+    }
+
+    /// What the blend is made of beside the closed form: F grows without bound towards the panel, where lanes that have nothing of it would lose their digits to it.
+    #[inline(always)]
+    pub(super) fn beyond<T: Lane>(&self, r: V3<T>, squared: T) -> Multipoles<T> {
+        self.multipoles(r, squared.at_least(self.reach[0]))
     }
 
     /// F at any distance.
@@ -349,7 +355,7 @@ impl Panel {
         if !(-squared).any_below(-self.reach[0]) {
             return near;
         }
-        let multipoles = self.multipoles(r, squared);
+        let multipoles = self.beyond(r, squared);
         let far = L::far_gradient(self, &multipoles);
         let w = Weight::new(squared, self.reach);
         let difference = L::near(self, s) - L::far(self, &multipoles);
@@ -369,7 +375,7 @@ impl Panel {
         if !(-squared).any_below(-self.reach[0]) {
             return near;
         }
-        let multipoles = self.multipoles(r, squared);
+        let multipoles = self.beyond(r, squared);
         let far = L::far_hessian_product(self, &multipoles, d);
         let w = Weight::new(squared, self.reach);
         let difference = L::near(self, s) - L::far(self, &multipoles);

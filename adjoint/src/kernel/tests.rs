@@ -47,6 +47,13 @@ impl Lane for HyperDual64 {
             _ => self,
         }
     }
+    fn at_least(self, bound: f64) -> Self {
+        if self.re < bound {
+            Self::from(bound)
+        } else {
+            self
+        }
+    }
     fn any_below(self, bound: f64) -> bool {
         self.re < bound
     }
@@ -433,6 +440,49 @@ fn sums_against_scalars(bands: usize, count: usize, k: usize, size: f64) -> f64 
         }
     }
     worst.max(gap(&found, &plain))
+}
+
+/// A point close above a panel, in one vector with some that are far from it: as by itself.
+#[test]
+fn near_points_keep_their_digits_beside_far_ones() {
+    let _widths = WIDTHS.lock().unwrap_or_else(|e| e.into_inner());
+    let t = ball(5, 1.0);
+    let corners = t.corners(0);
+    let normal = (corners[1] - corners[0])
+        .cross(&(corners[2] - corners[0]))
+        .normalize();
+    let edge = (corners[1] - corners[0]).norm();
+    let d = vec![Vec3::new(0.3, -0.5, 0.8); 8];
+    let mut bar = vec![0.0; t.len()];
+    bar[0] = 1.0;
+    for height in [1e-2, 1e-4, 1e-6, 0.0] {
+        let centre = corners.iter().sum::<Vec3>() / 3.0;
+        let mut points = vec![centre + height * edge * normal];
+        points.extend((1..8).map(|k| Vec3::new(40.0 * edge, f64::from(k), 3.0)));
+        let s = Sources::new(&points);
+        let at = [points[0].x, points[0].y, points[0].z];
+        let along = [d[0].x, d[0].y, d[0].z];
+        let panel = &t.panels[0];
+        let alone: [[f64; 3]; 4] = [
+            panel.gradient::<Single, _>(at),
+            panel.hessian_product::<Single, _>(at, along),
+            panel.gradient::<Double, _>(at),
+            panel.hessian_product::<Double, _>(at, along),
+        ];
+        for width in [4, 0] {
+            VECTORS.store(width, Relaxed);
+            let mut sums = [0; 4].map(|_| vec![0.0; 24]);
+            single_vjp(&t, &s, &bar, 1, &mut sums[0]);
+            single_hvp(&t, &s, &d, &bar, 1, &mut sums[1]);
+            double_vjp(&t, &s, &bar, 1, &mut sums[2]);
+            double_hvp(&t, &s, &d, &bar, 1, &mut sums[3]);
+            VECTORS.store(0, Relaxed);
+            for (k, (sum, alone)) in sums.iter().zip(&alone).enumerate() {
+                let off = gap(&sum[..3], alone);
+                assert!(off < 1e-12, "{k} at {height} on {width}: {off:e}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Corners, edges and faces, with a radius about them: balls, capsules and convex polyhedra.
 
-use super::field::{Field, leaves};
+use super::field::{AtCorner, Field, leaves};
 use crate::error::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use std::collections::BTreeMap;
@@ -191,12 +191,12 @@ impl Core {
     /// Signed distance of a point from the core, without the radius; none beyond `limit`. Inside,
     /// it is that to the nearest face.
     pub fn field(&self, p: &Vec3, limit: f64) -> Option<Field> {
-        self.field_of_corner(p, &[], limit)
+        Some(self.field_of_corner(p, &[], limit)?.field)
     }
 
     /// The same of the corner of another body, which it leaves `into` these directions (unit vectors): inside, it is that to the nearest face through which the other
     /// body may leave.
-    pub fn field_of_corner(&self, p: &Vec3, into: &[Vec3], limit: f64) -> Option<Field> {
+    pub fn field_of_corner(&self, p: &Vec3, into: &[Vec3], limit: f64) -> Option<AtCorner> {
         let beside = (self.bounds[0] - p).sup(&(p - self.bounds[1]));
         if beside.max() > limit {
             return None;
@@ -210,7 +210,7 @@ impl Core {
             if height <= least {
                 let leaving = heights.filter(|(_, f)| leaves(&f.normal, into));
                 let (height, face) = leaving.reduce(higher).unwrap_or((height, face));
-                return Some(Field::flat(height, face.normal));
+                return Some(AtCorner::flat(height, face.normal));
             }
         }
         // A foot within a face is the nearest point of all.
@@ -218,10 +218,11 @@ impl Core {
             .filter(|(h, f)| *h > 0.0 && f.is_below(p, 0.0))
             .max_by(|a, b| a.0.total_cmp(&b.0))
         {
-            return Some(Field::flat(height, face.normal));
+            return Some(AtCorner::flat(height, face.normal));
         }
         let field = self.round(p, least);
-        (field.distance <= limit).then_some(field)
+        let at_edge = AtCorner { field, over: false };
+        (field.distance <= limit).then_some(at_edge)
     }
 
     /// Distance to the nearest edge or corner.

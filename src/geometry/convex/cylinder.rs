@@ -1,6 +1,6 @@
 //! Circular cylinders and the discs at their ends: support points and signed distances.
 
-use super::field::{Field, across, leaves, perpendicular};
+use super::field::{AtCorner, Field, across, leaves, perpendicular};
 use super::round::{Approach, Round, Support};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
@@ -47,16 +47,17 @@ impl Cylinder {
 
     /// Signed distance of a point, frame of the cylinder: inside, from the nearer of side and ends.
     pub fn field(&self, y: &Vec3) -> Field {
-        self.field_of_corner(y, &[])
+        self.field_of_corner(y, &[]).field
     }
 
     /// The same of the corner of another body, which it leaves `into` these directions (unit vectors): inside, from the nearer of those through which the other body may leave.
-    pub fn field_of_corner(&self, y: &Vec3, into: &[Vec3]) -> Field {
+    pub fn field_of_corner(&self, y: &Vec3, into: &[Vec3]) -> AtCorner {
         let aside = y.x.hypot(y.y);
         let (beside, above) = (aside - self.radius, y.z.abs() - self.half);
         let up = Vec3::new(0.0, 0.0, 1f64.copysign(y.z));
         if beside > 0.0 && above > 0.0 {
-            return rim(y, aside, beside, above, &up, ROUNDING * self.radius);
+            let field = rim(y, aside, beside, above, &up, ROUNDING * self.radius);
+            return AtCorner { field, over: false };
         }
         let within = beside <= 0.0 && above <= 0.0;
         let on_axis = aside <= ROUNDING * self.radius;
@@ -70,16 +71,19 @@ impl Cylinder {
             _ => above >= beside,
         };
         if by_end {
-            return Field::flat(above, up);
+            return AtCorner::flat(above, up);
         }
         if on_axis {
-            return Field::flat(beside, gradient);
+            return AtCorner::flat(beside, gradient);
         }
         let around = up.cross(&gradient);
-        Field {
-            distance: beside,
-            gradient,
-            hessian: around * around.transpose() / aside,
+        AtCorner {
+            field: Field {
+                distance: beside,
+                gradient,
+                hessian: around * around.transpose() / aside,
+            },
+            over: beside > 0.0,
         }
     }
 }

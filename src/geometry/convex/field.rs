@@ -13,6 +13,32 @@ pub(crate) struct Field {
     pub hessian: Mat3,
 }
 
+/// The signed distance at the corner of another body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AtCorner {
+    pub field: Field,
+    /// Whether the corner is outside, over a face or a side rather than at an edge.
+    pub over: bool,
+}
+
+impl AtCorner {
+    /// The same in a frame that `rotation` leads to.
+    pub fn rotated(&self, rotation: &Mat3) -> Self {
+        Self {
+            field: self.field.rotated(rotation),
+            over: self.over,
+        }
+    }
+
+    /// Over a face.
+    pub fn flat(distance: f64, normal: Vec3) -> Self {
+        Self {
+            field: Field::flat(distance, normal),
+            over: distance > 0.0,
+        }
+    }
+}
+
 impl Field {
     /// Over a face.
     pub fn flat(distance: f64, normal: Vec3) -> Self {

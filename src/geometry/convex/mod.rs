@@ -23,7 +23,7 @@ use polish::polish;
 pub(crate) use self::core::{Core, Edge, Face};
 pub(crate) use cylinder::{Cylinder, Disc};
 pub(crate) use ellipsoid::Ellipsoid;
-pub(crate) use field::{Field, across, perpendicular};
+pub(crate) use field::{AtCorner, Field, across, perpendicular};
 pub(crate) use round::Round;
 
 /// Most different directions of edges of either body that are held against one another in an overlap.

@@ -113,6 +113,11 @@ impl<T: Lane> Lane for Dual<T> {
     fn clamp_unit(self) -> Self {
         Self::new(self.value.clamp_unit(), self.tangent)
     }
+    /// Nor here, where that blend is all of one form.
+    #[inline(always)]
+    fn at_least(self, bound: f64) -> Self {
+        Self::new(self.value.at_least(bound), self.tangent)
+    }
     #[inline(always)]
     fn any_below(self, bound: f64) -> bool {
         self.value.any_below(bound)

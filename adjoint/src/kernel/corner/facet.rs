@@ -81,7 +81,7 @@ impl<'a> Facet<'a> {
         if !(-squared).any_below(-reach[0]) {
             return numbers(&single, &double);
         }
-        let far = self.panel.multipoles(r, squared);
+        let far = self.panel.beyond(r, squared);
         let w = Weight::new(squared, reach);
         numbers(
             &self.blend(&single, &self.far_single(&far), &w, r, squared),

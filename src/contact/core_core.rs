@@ -34,15 +34,18 @@ pub(super) fn contacts(
     reach: f64,
 ) -> Vec<ContactPoint> {
     let mut out = Vec::new();
+    let shell = END * a.thickness.min(b.thickness);
     if a.is_ball() || !b.is_ball() {
         let limit = reach + a.radius + b.radius;
         let field = |y: &Vec3, into: &[Vec3]| b.field_of_corner(y, into, limit);
-        corners(a, a_at, (&field, b.radius), b_at, reach, |p| out.push(p));
+        let within = [reach, shell];
+        corners(a, a_at, (&field, b.radius), b_at, within, |p| out.push(p));
     }
     if !a.is_ball() {
         let limit = reach + b.radius + a.radius;
         let field = |y: &Vec3, into: &[Vec3]| a.field_of_corner(y, into, limit);
-        corners(b, b_at, (&field, a.radius), a_at, reach, |p| {
+        let within = [reach, shell];
+        corners(b, b_at, (&field, a.radius), a_at, within, |p| {
             out.push(p.swapped())
         });
     }
@@ -67,13 +70,13 @@ pub(super) fn contacts(
 /// Signed distances of corners from which bodies lead into some directions, where they are looked at.
 type Distances<'a> = &'a dyn Fn(&Vec3, &[Vec3]) -> Option<AtCorner>;
 
-/// Corners of `a`, which moves, against a body with a signed distance in its own frame and a radius about that.
+/// Corners of `a`, which moves, against a body with a signed distance in its own frame and a radius about that; `shell` as in [`beside`].
 pub(super) fn corners(
     a: &Core,
     a_at: &Pose,
     (field, radius): (Distances, f64),
     b_at: &Pose,
-    reach: f64,
+    [reach, shell]: [f64; 2],
     mut found: impl FnMut(ContactPoint),
 ) {
     let to_b = b_at.inverse().compose(a_at);
@@ -93,28 +96,31 @@ pub(super) fn corners(
         let mut point = ContactPoint::probe(&x, &carry(&x), radii, &seen);
         if point.gap < reach {
             for d in into.iter().filter(|_| at_corner.over) {
-                point = beside(point, &(b_at.rotation * d));
+                let above = at_corner.field.distance;
+                point = beside(point, &(b_at.rotation * d), above, shell);
             }
             found(point);
         }
     }
 }
 
-/// The point of a corner of the first body over a face of the second, from which the first leads into the direction `into` (world frame), as far as it may touch there: where it leads
-/// on through the face the corner is beside what the body stands on, and what crosses there touches.
-pub(super) fn beside(mut point: ContactPoint, into: &Vec3) -> ContactPoint {
+/// The point of a corner of the first body, `above` a face of the second, from which the first leads into the direction `into` (world frame), as far as it may touch there: where it
+/// leads on through the face the corner is beside what the body stands on, and what crosses there touches. Farther off than `shell` such a corner stands for a crossing that
+/// has faded.
+pub(super) fn beside(mut point: ContactPoint, into: &Vec3, above: f64, shell: f64) -> ContactPoint {
     let along = point.normal.dot(into);
-    if along < BESIDE[0] {
-        let slope = point.slopes.normal.tr_mul(into) + rotate(into).tr_mul(&point.normal);
-        let width = BESIDE[0] - BESIDE[1];
-        let mut weight = Weight {
-            value: point.weight,
-            slope: point.slopes.weight,
-        };
-        weight.fade((along - BESIDE[1]) / width, &(slope / width));
-        point.weight = weight.value;
-        point.slopes.weight = weight.slope;
+    if along >= BESIDE[0] || above >= shell {
+        return point;
     }
+    let slope = point.slopes.normal.tr_mul(into) + rotate(into).tr_mul(&point.normal);
+    let width = BESIDE[0] - BESIDE[1];
+    let [mut through, mut near] = [Weight::full(), Weight::full()];
+    through.fade_out((along - BESIDE[1]) / width, &(slope / width));
+    near.fade_out(above / shell, &(point.slopes.gap / shell));
+    let gone = through.value * near.value;
+    let gone_slope = through.value * near.slope + near.value * through.slope;
+    point.slopes.weight = (1.0 - gone) * point.slopes.weight - point.weight * gone_slope;
+    point.weight *= 1.0 - gone;
     point
 }
 

@@ -7,7 +7,7 @@
 //!
 //! A ball has its centre alone.
 
-use super::core_core::{self, DEPTH, crossing};
+use super::core_core::{self, DEPTH, END, crossing};
 use super::over_rim::{Rim, edge_over};
 use super::point::ContactPoint;
 use super::rim::{self, SIDES, axis};
@@ -25,7 +25,8 @@ pub(super) fn against_plane(cylinder: &Cylinder, at: &Pose, wall: &HalfSpace) ->
     };
     let mut out: Vec<_> = SIDES.into_iter().filter_map(end).collect();
     let field = |x: &Vec3, _: &[Vec3]| Some(AtCorner::flat(wall.height(x), wall.normal));
-    out.extend(rim::standing(cylinder, at, 0.0, field));
+    let shell = END * thickness(cylinder);
+    out.extend(rim::standing(cylinder, at, [0.0, shell], field));
     out
 }
 
@@ -38,7 +39,8 @@ pub(super) fn contacts(
     reach: f64,
 ) -> Vec<ContactPoint> {
     let mut out = Vec::new();
-    let depth = DEPTH * thickness(a).min(b.thickness);
+    let thin = thickness(a).min(b.thickness);
+    let (depth, shell) = (DEPTH * thin, END * thin);
     let edges = near_edges(a, a_at, b, b_at, reach);
     if !b.is_ball() {
         for side in SIDES {
@@ -67,10 +69,10 @@ pub(super) fn contacts(
             let found = b.field_of_corner(&to_b(x), &into, reach + b.radius)?;
             Some(found.rotated(&b_at.rotation))
         };
-        out.extend(rim::standing(a, a_at, b.radius, field));
+        out.extend(rim::standing(a, a_at, [b.radius, shell], field));
     }
     let field = |y: &Vec3, into: &[Vec3]| Some(a.field_of_corner(y, into));
-    core_core::corners(b, b_at, (&field, 0.0), a_at, reach, |p| {
+    core_core::corners(b, b_at, (&field, 0.0), a_at, [reach, shell], |p| {
         out.push(p.swapped())
     });
     let side = line(a, a_at);

@@ -4,7 +4,7 @@
 //! ([`super::rim`]), and where its rims, and its side lying across, come over those of the other ([`super::over_rim`]); and where the two cross side
 //! to side. An ellipsoid has the one point of its common normal with an end, a rim or the side.
 
-use super::core_core::{DEPTH, crossing};
+use super::core_core::{DEPTH, END, crossing};
 use super::cylinder::{line, thickness};
 use super::over_rim::{Rim, rim_over, side_over};
 use super::point::ContactPoint;
@@ -60,7 +60,8 @@ fn rims(a: &Cylinder, a_at: &Pose, b: &Cylinder, b_at: &Pose, reach: f64) -> Vec
         let found = b.field_of_corner(&b_at.apply_inverse(x), &into);
         Some(found.rotated(&b_at.rotation))
     };
-    out.extend(rim::standing(a, a_at, 0.0, field));
+    let shell = END * thickness(a).min(thickness(b));
+    out.extend(rim::standing(a, a_at, [0.0, shell], field));
     for side in SIDES {
         for other in SIDES {
             let (ours, theirs) = (Rim::new(a, a_at, side), Rim::new(b, b_at, other));

@@ -88,11 +88,11 @@ fn fixed(at: &Pose, out: &Vec3, mut point: ContactPoint) -> Option<ContactPoint>
 }
 
 /// The points of both rims that stay in place, in the distance field (world frame) of the second body, which has `radius`
-/// about that; it is told of the directions into the first as well.
+/// about that; it is told of the directions into the first as well. `shell` as in [`beside`].
 pub(super) fn standing(
     cylinder: &Cylinder,
     at: &Pose,
-    radius: f64,
+    [radius, shell]: [f64; 2],
     field: impl Fn(&Vec3, &[Vec3]) -> Option<AtCorner>,
 ) -> Vec<ContactPoint> {
     let point = |side: f64, k: usize| {
@@ -104,7 +104,7 @@ pub(super) fn standing(
         let at_corner = field(&x, &into)?;
         let mut found = ContactPoint::probe(&x, &carry(&x), [0.0, radius], &at_corner.field);
         for d in into.iter().filter(|_| at_corner.over) {
-            found = beside(found, d);
+            found = beside(found, d, at_corner.field.distance, shell);
         }
         fixed(at, &out, found)
     };

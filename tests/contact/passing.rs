@@ -126,7 +126,18 @@ fn a_spinning_box_doesnt_sweep_through_a_plate() {
 /// A ball struck by another takes over its speed within the step, and would pass the plate behind it, which it didn't come near to before.
 #[test]
 fn what_is_struck_doesnt_pass_either() {
+    what_is_struck_stays(None);
+}
+
+/// Nor where a stiffness was given: the plate is met, and sunk into as it asks for.
+#[test]
+fn what_is_struck_meets_a_given_stiffness() {
+    what_is_struck_stays(Some(1e6));
+}
+
+fn what_is_struck_stays(stiffness: Option<f64>) {
     let mut scene = touching(0.0);
+    contact(&mut scene).stiffness = stiffness;
     scene.gravity = [0.0; 3];
     let ball = |z: f64| {
         let body = Body::new(Shape::sphere(RADIUS)).density(1000.0);

@@ -2,7 +2,7 @@
 
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Contact, Fluid, Joint, Lubrication, Scene, Shape};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Lubrication, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use std::f64::consts::PI;
@@ -279,4 +279,35 @@ fn wrong_values_are_refused() {
         simulator(&scene).choices().integrator,
         Integrator::MomentumEuler
     );
+}
+
+/// A force of viscous water acts neither between neighbours in a chain nor at a free surface, which gives way.
+#[test]
+fn a_run_tells_where_no_film_can_be() {
+    let oval = |x| {
+        let body = Body::new(Shape::ellipsoid([0.1, 0.04, 0.04]).faces(320)).density(1100.0);
+        body.at([x, 0.0, 0.0])
+    };
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -GRAVITY];
+    scene.add(oval(0.0).named("front"));
+    let hinge = Joint::Revolute {
+        axis: [0.0, 0.0, 1.0],
+    };
+    let tail = oval(0.203).named("tail").child_of("front");
+    scene.add(tail.joint(hinge));
+    scene.add_force(Lubrication::new(1e-6).into());
+    let flow = run(&scene, 2).gap_flow().unwrap().expect("a gap");
+    assert_eq!(flow.bodies, ("front".into(), Some("tail".into())));
+    assert!(!flow.lubricated);
+
+    scene.bodies.truncate(1);
+    scene.walls.push(Wall {
+        surface: WallSurface::Free,
+        ..Wall::rigid([0.0, 0.0, 0.05], [0.0, 0.0, -1.0])
+    });
+    let settings = Settings::default().fidelity(Fidelity::Reduced);
+    let simulator = Simulator::new(&scene, settings).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 2)).unwrap();
+    assert!(rollout.gaps()[0].is_some() && rollout.gap_flow().unwrap().is_none());
 }

@@ -85,3 +85,54 @@ fn of_two_bodies_the_smaller_one_is_moved() {
     // The gap closes the flow off: less added mass when it opens.
     assert!(check.slope.iter().all(|slope| *slope < 0.0));
 }
+
+/// A post that is fixed a millimetre over the floor, and a ball that moves farther from it.
+fn post_and_ball() -> Scene {
+    let mut scene = over_a_floor(Shape::sphere(0.1), 0.15);
+    let post = Body::new(Shape::cuboid([0.05, 0.05, 0.3])).density(1000.0);
+    scene.add(post.named("post").at([0.5, 0.0, 0.151]).fixed());
+    scene.initial.v = vec![0.0, 0.0, -0.1, 0.0, 0.0, 0.0];
+    scene
+}
+
+/// What rests in the world doesn't come nearer to a wall: its gap there is none of the run's, and no contact.
+#[test]
+fn what_rests_at_a_wall_is_no_gap() {
+    let mut scene = post_and_ball();
+    scene.contact = Some(Default::default());
+    for fidelity in [Fidelity::Isolated, Fidelity::Reduced] {
+        let settings = Settings::default().fidelity(fidelity);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 3)).unwrap();
+        let gap = rollout.gaps()[0].unwrap();
+        assert!((gap.distance - 0.05).abs() < 1e-9, "{gap:?}");
+        let contacts = rollout.contacts(0, 1.0).unwrap();
+        assert!(contacts.iter().all(|c| c.first == 0), "{contacts:?}");
+        // Reaching through it is refused all the same where the flow has no meaning then.
+        let mut through = scene.clone();
+        through.bodies[1].placement.position[2] = 0.1;
+        let settings = Settings::default().fidelity(fidelity);
+        let refused = Simulator::new(&through, settings).is_err();
+        assert_eq!(refused, fidelity == Fidelity::Reduced);
+    }
+}
+
+/// By its own added mass a body is checked that has some: here the larger one, the other being fixed.
+#[test]
+fn a_fixed_neighbour_is_not_taken_for_what_moves() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.time_step = 0.01;
+    scene.add(Body::new(Shape::sphere(0.2)).density(1000.0).named("ball"));
+    let post = Body::new(Shape::sphere(0.05)).density(1000.0).named("post");
+    scene.add(post.at([0.27, 0.0, 0.0]).fixed());
+    let check = checked(&scene, &Settings::default().fidelity(Fidelity::Isolated)).unwrap();
+    assert_eq!(check.bodies, ("ball".into(), Some("post".into())));
+    let half = 0.5 * scene.fluid.density * 4.0 / 3.0 * std::f64::consts::PI * 0.008;
+    assert!((check.added_mass[0] / half - 1.0).abs() < 1e-3);
+    // Nothing that moves has a surface.
+    scene.bodies[0].shape = None;
+    (scene.bodies[0].density, scene.bodies[0].mass) = (None, Some(1.0));
+    scene.bodies[0].inertia = Some(vec![0.1; 3]);
+    scene.add_wall([0.0, 0.0, -0.06], [0.0, 0.0, 1.0]);
+    assert!(checked(&scene, &Settings::default().fidelity(Fidelity::Isolated)).is_none());
+}

@@ -687,3 +687,43 @@ fn bodies_in_one_another_are_an_error_not_a_number() {
         Ok(found) => assert!(found.momenta().iter().all(|x| x.is_finite())),
     }
 }
+
+/// Where points don't resolve a gap, I − LᵀGL has no positive energy and the factor says so. A search finds something there as well: what has less than no energy is refused by the
+/// names of the nearest, and nothing else is told.
+#[test]
+fn what_has_no_energy_is_refused() {
+    let kinds = edged(0.03);
+    let (mut refused, mut told) = (0, 0);
+    for seed in 0..12 {
+        let mut drawn = Samples::new(seed);
+        let turn = Pose::new(
+            exp_matrix(&Vec3::new(0.0, 0.0, drawn.number())),
+            Vec3::zeros(),
+        );
+        // A plate flat over another.
+        let apart = 0.2 + 1e-3 * 2.0_f64.powi(seed as i32 % 6);
+        let mut poses = vec![turn; 4];
+        poses[2].translation.z = apart;
+        for (k, x) in [(1, -3.0), (3, 3.0)] {
+            poses[k].translation.x = x;
+        }
+        let (factor, products) = both(&kinds, &poses, 0.01);
+        let basis = DMatrix::identity(24, 24);
+        if factor.evaluate(&poses, &basis).is_ok() {
+            continue;
+        }
+        refused += 1;
+        match products.evaluate(&poses, &basis) {
+            Ok(found) => {
+                let least = found.momenta().diagonal().min();
+                assert!(least > -1e-2, "{apart}: {least}");
+            }
+            Err(error) => {
+                told += 1;
+                says(error.to_string(), &["0", "nearer than", "films"]);
+            }
+        }
+    }
+    println!("of {refused} that the factor refuses {told} are refused by products");
+    assert!(refused > 0 && 2 * told > refused, "{told} of {refused}");
+}

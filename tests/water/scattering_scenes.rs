@@ -166,7 +166,7 @@ fn alone_a_body_has_what_is_given() {
 /// A shoal beside a wall and under a free surface.
 fn shoal() -> Scene {
     let mut scene = Scene::new(Fluid {
-        current: [0.1, -0.05, 0.0],
+        current: [0.1, 0.0, 0.0],
         ..Fluid::fresh_water()
     });
     scene.gravity = [0.0, 0.0, -9.81];

@@ -56,7 +56,7 @@ pub(super) fn stand_in(scene: &Scene, choices: &Choices) -> Option<String> {
     let [used, instead] = [choices.integrator, choices.in_place_of?].map(<&str>::from);
     if let (false, Some(body)) = (scene.has_contact(), scene.resisting()) {
         return Some(format!(
-            "the integrator {used}, of first order, in place of {instead}: what the joint of body {:?} resists with (`passive`, `servo`) is taken at the end of a step, which is stable however stiff; midpoint takes it implicitly, too, and is of second order",
+            "the integrator {used}, of first order, in place of {instead}: what the joint of body {:?} resists with (`passive`, `servo`) is taken at the end of a step, which is stable however stiff; midpoint takes it implicitly, too, and is of second order but for servos",
             body.name
         ));
     }

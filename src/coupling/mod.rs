@@ -34,6 +34,8 @@ mod surface_back;
 mod tensor;
 mod together;
 
+pub(crate) use settings::check_asked;
+
 pub use exclude::Exclusions;
 pub use given::Given;
 pub use isolated::Isolated;

@@ -24,7 +24,7 @@ pub(super) fn end(ranges: &[Range<usize>]) -> usize {
 }
 
 /// Refuses poses and columns of twists that aren't those of the coupling's bodies.
-pub(super) fn check_asked(
+pub(crate) fn check_asked(
     coupling: &dyn Coupling,
     poses: &[Pose],
     twists: &DMatrix<f64>,

@@ -76,6 +76,9 @@ impl Arithmetic {
     }
 }
 
+/// Of memory that the host reads.
+const READ: wgpu::BufferUsages = wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
+
 impl Context {
     /// An array of so many bytes, whatever they hold.
     ///
@@ -100,30 +103,40 @@ impl Context {
         if let Some(raw) = self.pool.take(bytes) {
             return Ok(of(raw));
         }
+        let usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_DST
+            | wgpu::BufferUsages::COPY_SRC;
+        let raw = self
+            .made(label, bytes, usage)
+            .map_err(|e| failed(e.to_string()))?;
+        self.check()?;
+        self.pool.count(|c| c.memory += bytes);
+        Ok(of(raw))
+    }
+
+    /// Fresh memory; where there is none, once more after all that isn't in use has been given back.
+    fn made(
+        &self,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> std::result::Result<wgpu::Buffer, wgpu::Error> {
         let attempt = || {
             let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
             let raw = self.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
-                size: bytes,
-                usage: wgpu::BufferUsages::STORAGE
-                    | wgpu::BufferUsages::COPY_DST
-                    | wgpu::BufferUsages::COPY_SRC,
+                size,
+                usage,
                 mapped_at_creation: false,
             });
             pollster::block_on(guard.pop()).map_or(Ok(raw), Err)
         };
-        let raw = match attempt() {
-            Ok(raw) => raw,
-            Err(_) => {
-                self.pool.drain();
-                // What is still in use is given back only once that has ended.
-                let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
-                attempt().map_err(|e| failed(e.to_string()))?
-            }
-        };
-        self.check()?;
-        self.pool.count(|c| c.memory += bytes);
-        Ok(of(raw))
+        attempt().or_else(|_| {
+            self.pool.drain();
+            // What is still in use is given back only once that has ended.
+            let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+            attempt()
+        })
     }
 
     /// An array of so many real numbers, zero at first.
@@ -233,16 +246,9 @@ impl Context {
                 "{total} bytes are to be read back at once, and a buffer holds at most {most}"
             )));
         }
-        let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read-back"),
-            size: total,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        if let Some(e) = pollster::block_on(guard.pop()) {
-            return Err(self.failure(format!("reading {total} bytes back: {e}")));
-        }
+        let staging = self
+            .made("read-back", total, READ)
+            .map_err(|e| self.failure(format!("reading {total} bytes back: {e}")))?;
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut at = 0;
         for (buffer, n) in parts {
@@ -297,17 +303,10 @@ impl Context {
             )));
         }
         if staging.as_ref().is_none_or(|(_, size)| *size < total) {
-            let guard = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
             let size = total.next_power_of_two().clamp(16, most);
-            let made = self.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("read-back"),
-                size,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            if let Some(e) = pollster::block_on(guard.pop()) {
-                return Err(self.failure(format!("reading {total} bytes back: {e}")));
-            }
+            let made = self
+                .made("read-back", size, READ)
+                .map_err(|e| self.failure(format!("reading {total} bytes back: {e}")))?;
             *staging = Some((made, size));
         }
         let Some((staging, _)) = staging else {
@@ -374,5 +373,26 @@ impl Context {
             bytes.iter().map(|b| arithmetic.numbers(b)).collect(),
             others,
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gpu::{Context, Options};
+
+    /// Arrays of ever other sizes, each given back: what lies idle doesn't grow without end.
+    #[test]
+    fn idle_memory_is_bounded() {
+        let context = Context::open(&Options::default()).expect("a device, if a software one");
+        for k in 0..40 {
+            let bytes = (24 << 20) + 4096 * k;
+            drop(context.bytes("tried", bytes).expect("memory"));
+        }
+        assert!(context.counts().memory <= super::super::pool::IDLE);
+        // The same size again is the same memory.
+        let before = context.counts().memory;
+        let bytes = (24 << 20) + 4096 * 39;
+        drop(context.bytes("tried", bytes).expect("memory"));
+        assert_eq!(context.counts().memory, before);
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Contact {
-    /// Stiffness of each point of contact, N/m. Default: ten times the heaviest moving body's mass over the square of the time
+    /// Stiffness of each point of contact, N/m. Default: ten times the heaviest moving body's mass, or that of the water it displaces where that is more, over the square of the time
     /// step, which is near rigid at that step.
     pub stiffness: Option<f64>,
     /// Dissipation d of Hunt and Crossley, s/m: surfaces that part faster than 1/d don't press.

@@ -278,8 +278,7 @@ impl Scene {
         let called = |name: &str| format!("{}{name}", options.prefix);
         self.check_new(path, bodies.iter().map(|b| called(&b.name)))?;
         self.check_new(path, folded.iter().map(|f| called(&f.name)))?;
-        let mut joints = Vec::new();
-        let mut added = Vec::new();
+        let (mut joints, mut all) = (Vec::new(), Vec::new());
         for body in &bodies {
             let mut made = options.body(body, base);
             made.parent = body.parent.map(|p| called(&bodies[p].name));
@@ -287,7 +286,7 @@ impl Scene {
             if let Some(zero) = options.zero(path, body, &made)? {
                 made.parent = Some(zero.name.clone());
                 made.placement = Placement::default();
-                added.push(self.add(zero));
+                all.push(zero);
             }
             if let Some(moves) = body.moves.as_ref().filter(|m| m.joint.velocities() > 0) {
                 let of = |led: &Led| {
@@ -301,11 +300,14 @@ impl Scene {
                 };
                 made.mimic = moves.mimic.as_ref().and_then(of);
                 if made.mimic.is_none() {
-                    joints.push((moves.name.clone(), BodyId(self.bodies.len())));
+                    let number = self.bodies.len() + all.len();
+                    joints.push((moves.name.clone(), BodyId(number)));
                 }
             }
-            added.push(self.add(made));
+            all.push(made);
         }
+        // All of it, or, where something is refused, nothing.
+        let added = all.into_iter().map(|body| self.add(body)).collect();
         for link in &folded {
             self.add_site(Site {
                 name: called(&link.name),

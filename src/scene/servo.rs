@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// τ = k (u − q − Δt q̇) − c q̇
 /// ```
 ///
-/// q + Δt q̇ being where the joint is at the end of the step. With an integrator that takes the velocity from there (`momentum-euler`, `energy-euler`, `midpoint`) it is implicit, and
-/// stable however stiff.
+/// q + Δt q̇ being where the joint is at the end of the step. With an integrator that takes the velocity from there (`momentum-euler`, `energy-euler`) it is implicit, and stable however stiff; with `midpoint`,
+/// whose q and q̇ are those of the middle, it is so too, and looks half a step beyond the end: of first order, as if c were k Δt larger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Servo {

@@ -51,7 +51,8 @@ impl Simulator {
     /// batch where it breaks; it must not wait for another member.
     ///
     /// With the backend gpu and the fidelity reduced their couplings are computed together, as many as there is memory for ([`BatchReport`]); what a member
-    /// becomes doesn't depend on the others, to the last bit. Everywhere else they are the rollouts by themselves, to the last bit.
+    /// becomes doesn't depend on the others, to the last bit. Everywhere else they are the rollouts by themselves, to the last bit. One batch takes all cores: not to be called
+    /// from a parallel iterator, whose other items would begin within the one that waits.
     ///
     /// # Errors
     /// A device that fails before any member runs; what befalls a member is its own.

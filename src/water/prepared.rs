@@ -105,7 +105,8 @@ pub(crate) fn prepare(
     let mut warnings = choices.without_effect();
     let idle = fidelity.kind().idle_gpu();
     let mut device = Device::open(choices.backend, &choices.gpu, idle)?;
-    if !changes.is_empty() && choices.backend == Backend::Gpu && fidelity.kind().coupled() {
+    let on_device = device.report().backend_used == Backend::Gpu;
+    if !changes.is_empty() && on_device && fidelity.kind().coupled() {
         return Err(Error::Unsupported {
             what: format!("{} shape parameters on the backend gpu", changes.len()),
             why: "the coupling there has no derivatives with respect to shapes".into(),

@@ -2,7 +2,7 @@
 
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Float, Fluid, Joint, Scene, Shape, Thruster};
+use hydrograd::scene::{Body, Float, Fluid, Joint, Passive, Scene, Shape, Thruster};
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -225,8 +225,15 @@ fn lagging(time_constant: f64) -> Scene {
 /// n = u (1 − e^(−t/T)) and m v = c u (t − T (1 − e^(−t/T))).
 #[test]
 fn a_rotor_lags() {
-    let (time_constant, u) = (0.15, 30.0);
-    let scene = lagging(time_constant);
+    a_rotor_lags_in(lagging(0.15), 0.15);
+    // What its gear adds to its inertia makes it no slower.
+    let mut geared = lagging(0.15);
+    geared.bodies[1].passive = Some(Passive::default().armature(0.1));
+    a_rotor_lags_in(geared, 0.15);
+}
+
+fn a_rotor_lags_in(scene: Scene, time_constant: f64) {
+    let u = 30.0;
     let sim = simulator(&scene, Integrator::Rk4);
     assert_eq!(sim.control_names(), ["jet"]);
     let controls = DMatrix::from_element(1, 300, u);

@@ -5,7 +5,7 @@ use crate::support::INTEGRATORS;
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::dynamics::{Drive, Integrator, System};
 use hydrograd::scene::{
-    Body, Controller, Drag, DragPart, Fluid, Joint, Motion, Plane, Scene, Shape,
+    Body, Controller, Drag, DragPart, Fluid, Joint, Mimic, Motion, Plane, Scene, Shape,
 };
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
@@ -420,5 +420,33 @@ fn held_joint_stands_still_and_moves_again() {
         assert_eq!((s[3].v[iv], s[4].v[iv]), (0.0, 0.0), "{integrator:?}");
         assert!(s[2].v[iv] != 0.0 && s[5].v[iv] != 0.0, "{integrator:?}");
         assert!(s[1].q[iq] != s[2].q[iq] && s[4].q[iq] != s[6].q[iq]);
+    }
+}
+
+/// Holding a joint that follows another holds that one, whose motion it is.
+#[test]
+fn a_follower_that_is_held_holds_its_leader() {
+    let slide = |name: &str| {
+        let body = Body::dry().named(name).mass(1.0).inertia([0.1; 3]);
+        body.joint(Joint::Prismatic {
+            axis: [1.0, 0.0, 0.0],
+        })
+    };
+    let mut scene = Scene::new(Fluid::none());
+    scene.add(slide("left").actuated());
+    scene.add(slide("right").mimic(Mimic::new("left").ratio(-1.0)));
+    for integrator in INTEGRATORS {
+        let settings = Settings::default().integrator(integrator);
+        let mut simulator = Simulator::new(&scene, settings).unwrap();
+        simulator.set_policy(Box::new(HoldAndRelease {
+            control: vec![1.0],
+            bodies: 2,
+            body: 1,
+            steps: 2..4,
+        }));
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 6)).unwrap();
+        let s = rollout.samples();
+        assert_eq!(s[2].q[0], s[4].q[0], "{integrator:?}");
+        assert!(s[1].q[0] != s[2].q[0] && s[4].q[0] != s[6].q[0]);
     }
 }

@@ -1337,4 +1337,12 @@ fn joints_are_driven_and_bodies_are_as_they_are_weighed() {
         &["zeros", "k", "follows another"],
     );
     assert!(read(&chain, &driven("j")).is_ok());
+    // What is refused leaves nothing of the robot behind: the next one needs no other names.
+    let (_folder, path) = file(&chain);
+    let mut scene = Scene::new(Fluid::fresh_water());
+    assert!(scene.add_robot(&path, &driven("k")).is_err() && scene.bodies.is_empty());
+    assert_eq!(
+        scene.add_robot(&path, &driven("j")).unwrap().bodies.len(),
+        3
+    );
 }

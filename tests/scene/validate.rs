@@ -2,7 +2,7 @@
 
 use crate::support::says;
 use hydrograd::scene::{
-    Body, Controller, Drag, Fluid, Joint, Motion, Plane, Scene, Servo, Shape, Wall,
+    Body, Controller, Drag, Fluid, Joint, Mimic, Motion, Plane, Scene, Servo, Shape, Thruster, Wall,
 };
 
 /// Two bodies that are right: a ball that slides along z, a coin that hangs on it.
@@ -605,4 +605,96 @@ fn waves_that_can_not_be_are_refused() {
     refused(served, &["controller.bodies", "\"ball\"", "servo"]);
     let slides = |s: &mut Scene| s.controller = Some(wave((&["ball"], &[], 0.1, 1.0, 0.0)));
     refused(slides, &["controller.bodies", "\"ball\"", "revolute"]);
+}
+
+/// Joints that follow others have no coordinate of their own: what asks for one says whose there is, and how numbers become the leader's.
+#[test]
+fn followers_have_nothing_of_their_own() {
+    let axis = [0.0, 0.0, 1.0];
+    let with = |s: &mut Scene, change: &dyn Fn(&mut Body)| {
+        let follower = Body::dry().named("finger").mass(1.0).inertia([1.0; 3]);
+        s.add(
+            follower
+                .joint(Joint::Prismatic { axis })
+                .mimic(Mimic::new("ball").ratio(0.5)),
+        );
+        change(&mut s.bodies[2]);
+    };
+    type Change = fn(&mut Body);
+    let changes: [(Change, &[&str]); 4] = [
+        (
+            |b| b.limits = Some([0.0, 0.04]),
+            &["limits", "less the offset and over the ratio"],
+        ),
+        (
+            |b| b.start = vec![0.1],
+            &["start", "less the offset and over the ratio"],
+        ),
+        (
+            |b| b.servo = Some(Servo::new(1.0, 0.0)),
+            &["servo", "ratio's square"],
+        ),
+        (|b| b.actuated = true, &["actuated", "\"ball\""]),
+    ];
+    for (change, words) in changes {
+        refused(|s| with(s, &change), words);
+    }
+    let nothing: Change = |_| ();
+    refused(
+        |s| {
+            with(s, &nothing);
+            s.controller = Some(Controller::SpeedStages {
+                bodies: vec!["finger".into()],
+                stages: vec![],
+            });
+        },
+        &["controller.bodies", "\"finger\"", "\"ball\""],
+    );
+    let thruster = |name: &str| {
+        let thruster = Thruster::new("ball").named(name).direction([0.0, 0.0, 1.0]);
+        thruster.rotor("finger", 0.1)
+    };
+    refused(
+        |s| {
+            with(s, &nothing);
+            s.add_force(thruster("port").into());
+        },
+        &["port", "rotor", "\"finger\"", "follows another joint"],
+    );
+    refused(
+        |s| {
+            with(s, &|b| b.mimic = None);
+            s.add_force(thruster("port").into());
+            s.add_force(thruster("starboard").into());
+        },
+        &["rotor", "\"finger\"", "another thruster"],
+    );
+}
+
+/// A servo's control is a target: controllers that give forces don't take it.
+#[test]
+fn forces_are_not_given_to_servos() {
+    let servo = |s: &mut Scene| s.bodies[0].servo = Some(Servo::new(50.0, 1.0));
+    refused(
+        |s| {
+            servo(s);
+            s.controller = Some(Controller::Pd {
+                target: vec![0.5],
+                stiffness: vec![20.0],
+                damping: vec![0.0],
+            });
+        },
+        &["pd", "\"ball\"", "servo", "target"],
+    );
+    refused(
+        |s| {
+            servo(s);
+            s.controller = Some(Controller::PushThenLock {
+                body: "ball".into(),
+                force: 5.0,
+                stop_at: 0.1,
+            });
+        },
+        &["controller.body", "\"ball\"", "servo"],
+    );
 }

@@ -84,7 +84,7 @@ impl PanelCoupled {
     }
 
     /// With the added mass of each body in unbounded fluid (about the body's origin, density 1), where it is known better than its
-    /// panels tell it.
+    /// panels tell it. Before [`PanelCoupled::on`]: a backend doesn't learn of it afterwards.
     pub fn with_added_mass(mut self, known: &[Option<Mat6>]) -> Self {
         Arc::make_mut(&mut self.model).know(known);
         self

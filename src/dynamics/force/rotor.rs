@@ -1,6 +1,6 @@
 //! Rotors of thrusters: a joint of one velocity n that is driven to a control u by the force (J/T)(u − n).
 //!
-//! J is the inertia that the rotor alone has along its joint with the scene's parameters, so that ṅ = (u − n)/T where what carries it doesn't turn and the water doesn't
+//! J is the inertia that the rotor alone has along its joint with the scene's parameters, its armature among them, so that ṅ = (u − n)/T where what carries it doesn't turn and the water doesn't
 //! hold it: the first-order lag of a speed-controlled motor, whose state is the rotor's velocity.
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
@@ -34,11 +34,12 @@ pub(super) fn assemble(
         let (values, link) = (&parts.values[body.0], &parts.tree.links()[body.0]);
         let matrix = spatial_inertia(values.mass, &values.center_of_mass, &values.inertia);
         let along = link.joint.basis()[0];
+        let armature = scene.bodies[body.0].passive.map(|p| p.armature);
         let owner = Owner::Named(scene.force_name(i));
         rotors.push(Rotor {
             rate: link.v.start,
             control,
-            inertia: along.dot(&(matrix * along)),
+            inertia: along.dot(&(matrix * along)) + armature.unwrap_or(0.0),
             time_constant: parameters.declare(owner, TIME_CONSTANT, time),
         });
     }

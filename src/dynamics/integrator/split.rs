@@ -122,8 +122,19 @@ impl Stepper<'_> {
             moved: vec![false; nv],
             is_driven: vec![false; nv],
         };
-        for (b, link) in self.system.tree.links().iter().enumerate() {
-            let is_held = held.get(b).copied().unwrap_or(false);
+        let links = self.system.tree.links();
+        let held = |b: usize| held.get(b).copied().unwrap_or(false);
+        // A joint is held with those that follow it.
+        let followers = links
+            .iter()
+            .enumerate()
+            .filter_map(|(b, link)| Some((b, link.follows?)));
+        let leaders: Vec<usize> = followers
+            .filter(|(b, _)| held(*b))
+            .map(|(_, follows)| follows.leader)
+            .collect();
+        for (b, link) in links.iter().enumerate() {
+            let is_held = held(b) || leaders.contains(&b);
             for (k, i) in link.v.clone().enumerate() {
                 match &self.system.drives[b] {
                     Drive::Motion(motions) => {

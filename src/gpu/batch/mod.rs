@@ -151,9 +151,9 @@ impl Together for Batch {
             out.waiting += report.waiting;
             out.iterations += report.iterations;
             out.evaluations += report.evaluations;
-            out.computing = report
-                .computing
-                .map(|own| own + out.computing.unwrap_or(0.0));
+            if let Some(own) = report.computing {
+                *out.computing.get_or_insert(0.0) += own;
+            }
         }
         out
     }

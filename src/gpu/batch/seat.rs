@@ -116,7 +116,8 @@ impl Seat {
     /// Bodies that touch.
     fn asks(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<bool> {
         let sizes = &self.group.model.sizes;
-        let fits = basis.ncols() == sizes.columns && poses.len() == sizes.bodies;
+        let right = poses.len() == sizes.bodies && basis.nrows() == 6 * sizes.bodies;
+        let fits = right && basis.ncols() == sizes.columns;
         Ok(fits && !self.group.model.reduced.narrow(poses)?)
     }
 

@@ -25,6 +25,7 @@ use super::context::Context;
 use super::points::{Compressed, PlacedPoints};
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
+use crate::coupling::check_asked;
 use crate::coupling::reduced::Reduced;
 use crate::coupling::{
     Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential, Together,
@@ -98,6 +99,7 @@ impl Coupling for GpuReduced {
     }
 
     fn evaluate(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Momenta> {
+        check_asked(self, poses, basis)?;
         if self.reduced().narrow(poses)? {
             return self.reduced().evaluate(poses, basis);
         }
@@ -141,6 +143,7 @@ impl Coupling for GpuReduced {
 
 impl Linearise for GpuReduced {
     fn linearise(&self, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Box<dyn Linearised + '_>> {
+        check_asked(self, poses, basis)?;
         if self.reduced().narrow(poses)? {
             return self.reduced().linearise(poses, basis);
         }

@@ -49,7 +49,7 @@ pub struct Thruster {
     #[serde(default, skip_serializing_if = "is_default")]
     pub loss: f64,
     /// Name of the body that is its rotor, on a joint with one velocity. The thrust is then that of this velocity n as the command, and the control is the velocity that
-    /// the rotor is driven to: by the joint force (J/T)(u − n), J being the rotor's own inertia along its joint at the start.
+    /// the rotor is driven to: by the joint force (J/T)(u − n), J being the rotor's own inertia along its joint at the start, with the armature there.
     pub rotor: Option<String>,
     /// T, s, of the rotor.
     pub time_constant: Option<f64>,
@@ -229,8 +229,17 @@ impl Thruster {
             _ if rotor.joint.velocities() != 1 => {
                 Some(format!("is on a {} joint", rotor.joint.kind()))
             }
+            _ if rotor.mimic.is_some() => Some("follows another joint".to_string()),
             _ if rotor.is_prescribed() => Some("is driven by a motion or locked".to_string()),
             _ if rotor.actuated => Some("is actuated".to_string()),
+            _ if scene
+                .thrusters()
+                .filter(|(_, _, t)| t.rotor == self.rotor)
+                .count()
+                > 1 =>
+            {
+                Some("another thruster drives".to_string())
+            }
             _ => None,
         };
         if let Some(why) = unfit {

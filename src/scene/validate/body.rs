@@ -26,8 +26,8 @@ pub(super) fn check(scene: &Scene, carriers: &Carriers, index: usize) -> Result<
     if let Some(rows) = &body.added_mass {
         check_added_mass(body, rows)?;
     }
-    check_joint(body)?;
     mimic::check(scene, body)?;
+    check_joint(body)?;
     if body.thruster && carriers.is_static(index) {
         return Err(Error::input(
             place(body, "thruster"),

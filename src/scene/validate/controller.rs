@@ -47,17 +47,21 @@ impl Scene {
                 stiffness,
                 damping,
             }) => {
-                let unfit = |b: &&Body| b.thruster || (b.actuated && b.joint.has_quaternion());
+                let unfit = |b: &&Body| {
+                    b.thruster || (b.actuated && (b.joint.has_quaternion() || b.servo.is_some()))
+                };
                 if let Some(body) = self.bodies.iter().find(unfit) {
                     return Err(Error::input(
                         "controller.kind",
                         "pd",
                         format!(
-                            "it drives joints without quaternions only, and body {:?} \
+                            "it drives joints without quaternions by forces, and body {:?} \
                              has {}: use kind = \"constant\" or a controller of your own in Rust",
                             body.name,
                             if body.thruster {
                                 "a thruster".into()
+                            } else if body.servo.is_some() {
+                                "a servo, whose control is a target and not a force".into()
                             } else {
                                 format!("an actuated {} joint", body.joint.kind())
                             }
@@ -90,7 +94,15 @@ impl Scene {
                         ),
                     ));
                 }
-                Ok(())
+                match body.servo {
+                    None => Ok(()),
+                    Some(_) => Err(Error::input(
+                        "controller.body",
+                        format!("{name:?}"),
+                        "push-then-lock pushes with a force, and the control of this body's joint is the target of its servo: take the servo away, or give the target as \
+                         kind = \"constant\"",
+                    )),
+                }
             }
             Some(Controller::Wave {
                 bodies,
@@ -159,6 +171,16 @@ impl Scene {
                                 "speed-stages watches prismatic and revolute joints, and this body has a {} joint: name \
                                  another",
                                 body.joint.kind()
+                            ),
+                        ));
+                    }
+                    if let Some(mimic) = &body.mimic {
+                        return Err(Error::input(
+                            "controller.bodies",
+                            format!("{name:?}"),
+                            format!(
+                                "its joint follows that of {:?} and has no speed of its own: name that one",
+                                mimic.body
                             ),
                         ));
                     }

@@ -4,6 +4,11 @@ use super::{finite, place};
 use crate::scene::{Body, Scene};
 use crate::{Error, Result};
 
+/// What becomes of a follower's numbers where they are given to its leader.
+const COORDINATE: &str = ", less the offset and over the ratio";
+const SQUARE: &str = ", times the ratio's square";
+const LOSSES: &str = ", times the ratio's square, friction times its size";
+
 pub(super) fn check(scene: &Scene, body: &Body) -> Result<()> {
     let Some(mimic) = &body.mimic else {
         return Ok(());
@@ -38,18 +43,20 @@ pub(super) fn check(scene: &Scene, body: &Body) -> Result<()> {
     finite(&at("ratio"), &[mimic.ratio])?;
     finite(&at("offset"), &[mimic.offset])?;
     let own = [
-        ("motion", body.motion.is_some()),
-        ("locked", body.locked),
-        ("limits", body.limits.is_some()),
-        ("passive", body.passive.is_some()),
-        ("actuated", body.actuated),
+        ("start", !body.start.is_empty(), COORDINATE),
+        ("motion", body.motion.is_some(), COORDINATE),
+        ("locked", body.locked, ""),
+        ("limits", body.limits.is_some(), COORDINATE),
+        ("passive", body.passive.is_some(), LOSSES),
+        ("servo", body.servo.is_some(), SQUARE),
+        ("actuated", body.actuated, ""),
     ];
-    match own.iter().find(|(_, given)| *given) {
-        Some((key, _)) => Err(Error::input(
+    match own.iter().find(|(_, given, _)| *given) {
+        Some((key, _, how)) => Err(Error::input(
             place(body, key),
             format!("{key} of a joint that follows another"),
             format!(
-                "it has no coordinate of its own: give `{key}` to {:?}, times the ratio, or take `mimic` away",
+                "it has no coordinate of its own: give `{key}` to {:?}{how}, or take `mimic` away",
                 mimic.body
             ),
         )),

@@ -659,7 +659,7 @@ fn followers_have_nothing_of_their_own() {
             with(s, &nothing);
             s.add_force(thruster("port").into());
         },
-        &["port", "rotor", "\"finger\"", "follows another joint"],
+        &["rotor", "\"finger\"", "follows another joint"],
     );
     refused(
         |s| {

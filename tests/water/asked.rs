@@ -18,6 +18,11 @@ fn at(x: f64) -> Pose {
     Pose::new(Mat3::identity(), Vec3::new(x, 0.0, 0.0))
 }
 
+/// Of two equal bodies.
+fn both<T>(body: Arc<T>) -> Vec<Arc<T>> {
+    vec![body.clone(), body]
+}
+
 /// Two balls by every fidelity.
 fn couplings() -> Vec<Box<dyn Linearise>> {
     let surface = mesh(&Shape::sphere(1.0), 320);
@@ -36,10 +41,10 @@ fn couplings() -> Vec<Box<dyn Linearise>> {
         PanelCoupled::new(bodies, &[], none.clone(), solve).unwrap()
     };
     let filmed = coupled().with_films(&[(&surface, None), (&surface, None)], &[]);
-    let reduced = Reduced::new(vec![Arc::new(compressed); 2], &[], |_, _| None).unwrap();
+    let reduced = Reduced::new(both(Arc::new(compressed)), &[], |_, _| None).unwrap();
     let levels = Levels::for_accuracy(0.01).unwrap();
     let many = Scattering::of(&reduced, &[at(0.0), at(3.0)], levels).unwrap();
-    let full = Full::new(vec![Arc::new(sources); 2], &[], none.clone(), solve);
+    let full = Full::new(both(Arc::new(sources)), &[], none.clone(), solve);
     vec![
         Box::new(Isolated::new(vec![Mat6::identity(); 2])),
         Box::new(full.unwrap()),

@@ -27,14 +27,12 @@ pub mod panel;
 pub mod reduced;
 mod response;
 pub mod scattering;
-mod settings;
+pub(crate) mod settings;
 mod shape;
 mod surface;
 mod surface_back;
 mod tensor;
 mod together;
-
-pub(crate) use settings::check_asked;
 
 pub use exclude::Exclusions;
 pub use given::Given;

@@ -25,8 +25,8 @@ use super::context::Context;
 use super::points::{Compressed, PlacedPoints};
 use crate::adjoint::lie::Pose;
 use crate::boundary::PanelBoundary;
-use crate::coupling::check_asked;
 use crate::coupling::reduced::Reduced;
+use crate::coupling::settings::check_asked;
 use crate::coupling::{
     Coupling, Linearise, Linearised, Momenta, Motion, MotionBar, SurfacePotential, Together,
 };

@@ -205,9 +205,7 @@ pub(super) fn main(
         Err(error) => return Err(error),
     }
     // After what is kept, which neither a failure nor Ctrl-C may cost: it takes long.
-    if halted.is_none() {
-        report.look_at_gap(&rollout, arguments.check_gap);
-    }
+    report.look_at_gap(&rollout, arguments.check_gap && halted.is_none());
     match arguments.record(videos, rollout) {
         Ok(files) => report.files.extend(files),
         Err(why) if halted.is_some() => output.error_for_people(&why),

@@ -95,9 +95,11 @@ pub(super) fn corners(
         let seen = at_corner.field.rotated(&b_at.rotation);
         let mut point = ContactPoint::probe(&x, &carry(&x), radii, &seen);
         if point.gap < reach {
-            for d in into.iter().filter(|_| at_corner.over) {
-                let above = at_corner.field.distance;
-                point = beside(point, &(b_at.rotation * d), above, shell);
+            if at_corner.over {
+                for d in &into {
+                    let above = at_corner.field.distance;
+                    point = beside(point, &(b_at.rotation * d), above, shell);
+                }
             }
             found(point);
         }

@@ -24,7 +24,7 @@ pub(super) fn against_plane(cylinder: &Cylinder, at: &Pose, wall: &HalfSpace) ->
         rim::lowest(at, found)
     };
     let mut out: Vec<_> = SIDES.into_iter().filter_map(end).collect();
-    let field = |x: &Vec3, _: &[Vec3]| Some(AtCorner::flat(wall.height(x), wall.normal));
+    let field = |x: &Vec3, _: &[Vec3; 2]| Some(AtCorner::flat(wall.height(x), wall.normal));
     let shell = END * thickness(cylinder);
     out.extend(rim::standing(cylinder, at, [0.0, shell], field));
     out
@@ -64,8 +64,8 @@ pub(super) fn contacts(
     }
     if !b.faces.is_empty() {
         let to_b = |x: &Vec3| b_at.apply_inverse(x);
-        let field = |x: &Vec3, into: &[Vec3]| {
-            let into: Vec<Vec3> = into.iter().map(|d| b_at.rotation.tr_mul(d)).collect();
+        let field = |x: &Vec3, into: &[Vec3; 2]| {
+            let into = into.map(|d| b_at.rotation.tr_mul(&d));
             let found = b.field_of_corner(&to_b(x), &into, reach + b.radius)?;
             Some(found.rotated(&b_at.rotation))
         };

@@ -55,8 +55,8 @@ fn rims(a: &Cylinder, a_at: &Pose, b: &Cylinder, b_at: &Pose, reach: f64) -> Vec
         rim::lowest(a_at, rim::shallow(found, depth))
     });
     let mut out: Vec<ContactPoint> = near.collect();
-    let field = |x: &Vec3, into: &[Vec3]| {
-        let into: Vec<Vec3> = into.iter().map(|d| b_at.rotation.tr_mul(d)).collect();
+    let field = |x: &Vec3, into: &[Vec3; 2]| {
+        let into = into.map(|d| b_at.rotation.tr_mul(&d));
         let found = b.field_of_corner(&b_at.apply_inverse(x), &into);
         Some(found.rotated(&b_at.rotation))
     };

@@ -93,7 +93,7 @@ pub(super) fn standing(
     cylinder: &Cylinder,
     at: &Pose,
     [radius, shell]: [f64; 2],
-    field: impl Fn(&Vec3, &[Vec3]) -> Option<AtCorner>,
+    field: impl Fn(&Vec3, &[Vec3; 2]) -> Option<AtCorner>,
 ) -> Vec<ContactPoint> {
     let point = |side: f64, k: usize| {
         let (sin, cos) = (TAU * k as f64 / RIM_POINTS as f64).sin_cos();
@@ -103,8 +103,10 @@ pub(super) fn standing(
         let into = [-out, -side * axis(at)];
         let at_corner = field(&x, &into)?;
         let mut found = ContactPoint::probe(&x, &carry(&x), [0.0, radius], &at_corner.field);
-        for d in into.iter().filter(|_| at_corner.over) {
-            found = beside(found, d, at_corner.field.distance, shell);
+        if at_corner.over {
+            for d in &into {
+                found = beside(found, d, at_corner.field.distance, shell);
+            }
         }
         fixed(at, &out, found)
     };

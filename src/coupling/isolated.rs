@@ -99,7 +99,7 @@ impl Coupling for Isolated {
         surfaces: &[Arc<PanelBoundary>],
     ) -> Result<Vec<SurfacePotential>> {
         check(motion, surfaces)?;
-        Ok(on_surfaces(motion, surfaces, &[], &[], None))
+        Ok(on_surfaces(motion, surfaces, &[], |_| Vec::new(), None))
     }
 
     fn surface_potentials_vjp(

@@ -199,6 +199,7 @@ pub(super) struct Charges<'a> {
 }
 
 /// A body that sees the sources of another, or an image of them.
+#[derive(Clone, Copy)]
 pub(super) struct Seen {
     pub target: usize,
     pub source: usize,
@@ -207,22 +208,20 @@ pub(super) struct Seen {
     pub weight: [f64; 2],
 }
 
-/// Total potentials on all surfaces, of bodies that see each other's sources, where films hold some of them apart if any do.
+/// Total potentials on all surfaces, of bodies of which `seen` tells what each sees, where films hold some of them apart if any do.
 pub(super) fn on_surfaces(
     motion: &Motion,
     surfaces: &[Arc<PanelBoundary>],
     charges: &[Charges],
-    seen: &[Seen],
+    seen: impl Fn(usize) -> Vec<Seen> + Sync,
     held: Option<Held>,
 ) -> Vec<SurfacePotential> {
-    let mut seen_by: Vec<Vec<&Seen>> = surfaces.iter().map(|_| Vec::new()).collect();
-    seen.iter().for_each(|seen| seen_by[seen.target].push(seen));
     let of = |(b, surface): (usize, &Arc<PanelBoundary>)| {
         let centres = &surface.faces.centres;
         let mut incident = Columns::zeros(centres.len(), 2);
-        for seen in &seen_by[b] {
+        for seen in seen(b) {
             let source = &charges[seen.source];
-            add(motion, centres, (seen, source), held, &mut incident);
+            add(motion, centres, (&seen, source), held, &mut incident);
         }
         let twist = |x: &DVector<f64>| x.fixed_rows::<6>(6 * b).into_owned();
         let twists = [

@@ -15,12 +15,13 @@
 //! ```
 
 use super::pair::{Pair, vector};
-use super::surface::{MotionBar, SurfacePotential, check_bars};
+use super::surface::{Motion, MotionBar, SurfacePotential, check_bars};
 use crate::Result;
 use crate::adjoint::kernel::{Points, potential_hvp, potential_sum, potential_vjp};
 use crate::adjoint::lie::{Vec3, Vec6, point_wrench, six};
 use crate::boundary::PanelBoundary;
 use crate::solver::Columns;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// What the bodies' own panels make of the cotangents.
@@ -88,6 +89,29 @@ pub(super) fn pull(
         }
     };
     (0..count).map(of).collect()
+}
+
+/// [`pull`] of a pair that counts as its image does, whose sources stand in a range of all `strengths`: adds to the cotangents of those, and to the spatial wrenches on the bodies with their
+/// rates.
+pub(super) fn pull_pair(
+    motion: &Motion,
+    pair: &Pair,
+    seen_by: (&[Vec3], &Columns),
+    (range, strengths): (&Range<usize>, &Columns),
+    bars: &mut Columns,
+    [wrench, rate]: &mut [Vec<Vec6>; 2],
+) {
+    let (t, sign) = (pair.target, pair.image.sign);
+    let (pose, z) = (&motion.poses[t], motion.displacement);
+    let d = pair.displacements(pose, z);
+    let mut own = bars.part(range);
+    let given = strengths.part(range);
+    let pulled = pull(pair, &d, seen_by, &given, [sign, 0.0], &mut own);
+    bars.slice_mut(range).copy_from_slice(&own.data);
+    let forces = pulled.iter().map(|p| [sign * p.force, sign * p.dforce]);
+    let [w, dw] = wrenches(pair, &d, forces);
+    pair.apply(pose, &w, wrench);
+    pair.apply_jvp(pose, &w, &dw, &z[t], rate);
 }
 
 /// The wrench of forces on the sources of a pair, and its rate, in the frame of the body that sees them.

@@ -188,6 +188,7 @@ impl<'a> Evaluation<'a> {
         Ok(Factor::Blocks(factors))
     }
 
+    /// The factor of trees of joints, of bodies with these added masses.
     fn articulated(&self, free: &[usize], added: Option<&[Mat6]>) -> Result<Articulated> {
         let mut inertias = self.rigid.clone();
         if let Some(added) = added {

@@ -54,9 +54,10 @@ pub(crate) struct Clearance {
     pub resolved_edges: f64,
 }
 
-/// The nearest joint that moves each body: those with the same one don't move relative to one another.
+/// What moves bodies that rest in the world.
 const WORLD: usize = usize::MAX;
 
+/// The nearest joint that moves each body: those with the same one don't move relative to one another.
 fn movers(scene: &Scene, tree: &Tree) -> Vec<usize> {
     let mut out: Vec<usize> = Vec::with_capacity(scene.bodies.len());
     for (b, (body, link)) in scene.bodies.iter().zip(tree.links()).enumerate() {

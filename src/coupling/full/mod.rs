@@ -39,7 +39,7 @@ pub use settings::{FullSolver, Preconditioner, SolveSettings};
 use super::response::{CoupledResponse, Solved};
 use super::settings::check_asked;
 use super::surface::{self, Charges, Seen};
-use super::surface_back::{Back, onto_charges, pull, wrenches};
+use super::surface_back::{Back, onto_charges, pull_pair};
 use super::{
     Coupling, Direction, Exclusions, Linearise, Linearised, Momenta, Motion, MotionBar,
     SurfacePotential,
@@ -218,9 +218,8 @@ impl Coupling for Full {
                 weight: [1.0, 0.0],
             })
             .collect();
-        Ok(surface::on_surfaces(
-            motion, surfaces, &charges, &seen, None,
-        ))
+        let seen = |b: usize| seen.iter().filter(|s| s.target == b).copied().collect();
+        Ok(surface::on_surfaces(motion, surfaces, &charges, seen, None))
     }
 
     /// On the CPU.
@@ -233,26 +232,20 @@ impl Coupling for Full {
         surface::check(motion, surfaces)?;
         let Back { mut bar, densities } = onto_charges(surfaces, bars)?;
         let cpu = Cpu::new(self.model.clone())?;
-        let (model, z) = (self.model(), motion.displacement);
+        let model = self.model();
         let strengths = self.strengths(motion)?;
         let mut beta = Columns::zeros(model.columns(), 2);
         let bodies = model.bodies.len();
-        let (mut gradient, mut wrench) = (vec![Vec6::zeros(); bodies], vec![Vec6::zeros(); bodies]);
+        let mut pulls = [vec![Vec6::zeros(); bodies], vec![Vec6::zeros(); bodies]];
         for pair in model.pairs(motion.poses) {
-            let (t, s) = (pair.target, &model.sources[pair.source]);
-            let pose = &motion.poses[t];
-            let (d, sign) = (pair.displacements(pose, z), pair.image.sign);
-            let mut own = beta.part(s);
-            let seen = (surfaces[t].faces.centres.as_slice(), &densities[t]);
-            let given = strengths.part(s);
-            let pulled = pull(&pair, &d, seen, &given, [sign, 0.0], &mut own);
-            beta.slice_mut(s).copy_from_slice(&own.data);
-            let forces = pulled.iter().map(|p| [sign * p.force, sign * p.dforce]);
-            let [w, dw] = wrenches(&pair, &d, forces);
-            pair.apply(pose, &w, &mut gradient);
-            pair.apply_jvp(pose, &w, &dw, &z[t], &mut wrench);
+            let seen_by = (
+                &surfaces[pair.target].faces.centres[..],
+                &densities[pair.target],
+            );
+            let sources = (&model.sources[pair.source], &strengths);
+            pull_pair(motion, &pair, seen_by, sources, &mut beta, &mut pulls);
         }
-        bar.add_pull(z, &gradient, &wrench);
+        bar.add_pull(motion.displacement, &pulls[0], &pulls[1]);
         cpu.strengths_vjp(motion, &beta, &mut bar)?;
         Ok(bar)
     }

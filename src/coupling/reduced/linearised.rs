@@ -418,9 +418,8 @@ impl Coupling for Reduced {
             films: &solved.films,
             moving: &moving,
         });
-        Ok(surface::on_surfaces(
-            motion, surfaces, &charges, &seen, held,
-        ))
+        let seen = |b: usize| seen.iter().filter(|s| s.target == b).copied().collect();
+        Ok(surface::on_surfaces(motion, surfaces, &charges, seen, held))
     }
 
     fn surface_potentials_vjp(

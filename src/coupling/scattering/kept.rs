@@ -53,7 +53,7 @@ pub(super) struct Kept {
     pub report: CouplingReport,
     /// Iterations and residual of the first solve that missed its tolerance.
     pub failed: Option<(usize, f64)>,
-    /// Energy of the first answer that has less than none, in that of the bodies alone.
+    /// Energy of the first answer that has less than none, in that of the water displaced.
     pub negative: Option<f64>,
     /// What the first to recoil begins from.
     pub near: Option<Near>,

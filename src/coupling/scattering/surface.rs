@@ -9,7 +9,7 @@ use crate::boundary::PanelBoundary;
 use crate::coupling::pair::Pair;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::surface::{self, Charges, Held, Seen};
-use crate::coupling::surface_back::{Back, onto_charges, pull, wrenches};
+use crate::coupling::surface_back::{Back, onto_charges, pull_pair};
 use crate::coupling::{Motion, MotionBar, SurfacePotential};
 use crate::solver::Columns;
 use nalgebra::DMatrix;
@@ -22,11 +22,9 @@ impl Scattering {
         self.place(motion.poses, Box::new(Dense(none)))
     }
 
-    /// Who sees whose sources: each body those of all others, and all images, its own among them.
-    fn seen(&self) -> Vec<Seen> {
-        let bodies = 0..self.bodies.len();
-        let pairs = bodies.flat_map(|t| (0..self.bodies.len()).map(move |s| (t, s)));
-        let seen = pairs.flat_map(|(target, source)| {
+    /// Whose sources a body sees: those of all others, and all images, its own among them.
+    fn seen_by(&self, target: usize) -> Vec<Seen> {
+        let seen = (0..self.bodies.len()).flat_map(|source| {
             let images = self.images.iter().filter(move |image| {
                 !image.is_identity() || (target != source && !self.refuses(target, source))
             });
@@ -72,7 +70,7 @@ impl Scattering {
             motion,
             surfaces,
             &charges,
-            &self.seen(),
+            |b| self.seen_by(b),
             held,
         ))
     }
@@ -93,24 +91,18 @@ impl Scattering {
         let moving = at.moving(z);
         let strengths = at.strengths(motion, &moving);
         let still = vec![Vec6::zeros(); self.bodies.len()];
-        let (mut gradient, mut wrench) = (still.clone(), still);
+        let mut pulls = [still.clone(), still];
         let mut beta = Columns::zeros(strengths.rows, 2);
-        for seen in self.seen() {
-            let (t, s, sign) = (seen.target, seen.source, seen.image.sign);
-            let (points, range) = (&self.bodies[s].parts().points, &self.points[s]);
-            let place = |b: usize| (b, &motion.poses[b]);
+        let place = |b: usize| (b, &motion.poses[b]);
+        for seen in (0..self.bodies.len()).flat_map(|b| self.seen_by(b)) {
+            let (t, s) = (seen.target, seen.source);
+            let points = &self.bodies[s].parts().points;
             let pair = Pair::new(place(t), place(s), &seen.image, points);
-            let d = pair.displacements(&motion.poses[t], z);
-            let mut own = beta.part(range);
-            let centres = (&surfaces[t].faces.centres[..], &densities[t]);
-            let strengths = strengths.part(range);
-            let pulled = pull(&pair, &d, centres, &strengths, seen.weight, &mut own);
-            beta.slice_mut(range).copy_from_slice(&own.data);
-            let forces = pulled.iter().map(|p| [sign * p.force, sign * p.dforce]);
-            let [w, dw] = wrenches(&pair, &d, forces);
-            pair.apply(&motion.poses[t], &w, &mut gradient);
-            pair.apply_jvp(&motion.poses[t], &w, &dw, &z[t], &mut wrench);
+            let seen_by = (&surfaces[t].faces.centres[..], &densities[t]);
+            let sources = (&self.points[s], &strengths);
+            pull_pair(motion, &pair, seen_by, sources, &mut beta, &mut pulls);
         }
+        let [mut gradient, mut wrench] = pulls;
         let [values, rates] = [0, 1].map(|k| beta.column(k));
         let (of_rates, impulses) = at.answered(&rates);
         bar.rates += impulses / FLUX;

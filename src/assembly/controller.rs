@@ -105,6 +105,7 @@ pub(super) fn policy(scene: &Scene, system: &System) -> Box<dyn Policy> {
         Some(Controller::Playback { control }) => Box::new(Playback {
             controls,
             steps: control,
+            time_step: scene.time_step,
         }),
     }
 }

@@ -113,11 +113,12 @@ fn matching(other: Other) -> Option<usize> {
     }
 }
 
-/// The bearing of one gap, as one of a scene's forces would have it, and its bodies.
+/// The bearing of one gap, as a force of that reach (m; by default the bodies' own) would have it, and its bodies.
 pub(crate) fn bearing(
     scene: &Scene,
     surfaces: &[Option<Surface>],
     (first, second): (usize, Other),
+    reach: Option<f64>,
 ) -> Result<Option<(usize, Option<usize>, Bearing)>> {
-    Ok(Sides::new(scene, surfaces)?.between(first, second, None))
+    Ok(Sides::new(scene, surfaces)?.between(first, second, reach))
 }

@@ -199,6 +199,19 @@ impl Tree {
         self.links.iter().filter(|l| l.follows.is_none())
     }
 
+    /// Which joints stand still where those of the bodies in `hold` are held (a shorter list holds no others): a joint is held with those that follow it.
+    pub fn held(&self, hold: &[bool]) -> Vec<bool> {
+        let mut held: Vec<bool> = (0..self.links.len())
+            .map(|b| hold.get(b).copied().unwrap_or(false))
+            .collect();
+        for (b, link) in self.links.iter().enumerate() {
+            if let Some(follows) = link.follows.as_ref().filter(|_| held[b]) {
+                held[follows.leader] = true;
+            }
+        }
+        held
+    }
+
     /// The bodies with their joints.
     pub fn links(&self) -> &[Link] {
         &self.links

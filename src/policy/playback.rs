@@ -4,25 +4,39 @@ use super::{Action, ActionBar, Observation, Policy, expect};
 use crate::Result;
 use nalgebra::DVector;
 
-/// Given controls, step by step; nothing after the last one. Gains: the controls of all steps in turn.
+/// Given controls, each for as long as a step; nothing after the last one. What runs with shorter or longer steps is given what was meant for the time at which each
+/// of its steps begins. Gains: the controls of all rows in turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
     /// Number of controls of the system.
     pub controls: usize,
     /// Controls of each step, N or N m.
     pub steps: Vec<Vec<f64>>,
+    /// How long each lasts, s.
+    pub time_step: f64,
+}
+
+/// Of a step: times are products of numbers of steps, rounded.
+const ROUNDING: f64 = 1e-9;
+
+impl Playback {
+    /// Which controls are those of a time.
+    fn row(&self, time: f64) -> usize {
+        (time / self.time_step * (1.0 + ROUNDING)) as usize
+    }
 }
 
 impl Policy for Playback {
     fn act(&self, observed: &Observation) -> Result<Action> {
-        let control = self.steps.get(observed.step).cloned();
+        let control = self.steps.get(self.row(observed.time)).cloned();
         Ok(Action::control(control.unwrap_or_default()))
     }
 
     fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         let mut gains = vec![0.0; self.controls * self.steps.len()];
-        if observed.step < self.steps.len() {
-            let from = self.controls * observed.step;
+        let row = self.row(observed.time);
+        if row < self.steps.len() {
+            let from = self.controls * row;
             gains[from..from + self.controls].copy_from_slice(control_bar.as_slice());
         }
         Ok(ActionBar::gains(gains))
@@ -38,6 +52,7 @@ impl Policy for Playback {
         Ok(Box::new(Self {
             controls: self.controls,
             steps: steps.collect(),
+            time_step: self.time_step,
         }))
     }
 }

@@ -323,7 +323,7 @@ pub enum Controller {
         /// negative, from below otherwise.
         stop_at: f64,
     },
-    /// Given controls, step by step, and nothing after the last: an optimised trajectory to be run again.
+    /// Given controls, each for as long as a step of the scene, and nothing after the last: an optimised trajectory to be run again, with steps of another length as well.
     Playback {
         /// One row per step, in it one per control, N or N m.
         control: Vec<Vec<f64>>,

@@ -42,7 +42,7 @@ impl<F: FnMut(usize, &Sample) -> Result<DVector<f64>>> Step for Deciding<'_, F> 
     type Error = Error;
 
     fn step(&self, index: usize, state: &State) -> Result<(State, Sample, StepRecord)> {
-        self.trajectory.advance(index, state, |sample| {
+        self.trajectory.advance(state, |sample| {
             let control = (self.decide.borrow_mut())(index, sample)?;
             let expected = self.trajectory.controls.nrows();
             if control.len() != expected {

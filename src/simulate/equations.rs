@@ -170,8 +170,10 @@ impl Equations<'_> {
         check_numbers("generalised force", force, n)?;
         check_numbers("acceleration of driven joints", driven, n)?;
         let (mut free, mut given) = (Vec::new(), driven.clone());
-        for (b, (drive, link)) in system.drives.iter().zip(system.tree.links()).enumerate() {
-            if *drive == Drive::Free && !hold.get(b).copied().unwrap_or(false) {
+        let held = system.tree.held(hold);
+        let joints = system.drives.iter().zip(system.tree.links());
+        for ((drive, link), held) in joints.zip(held) {
+            if *drive == Drive::Free && !held {
                 free.extend(link.v.clone());
                 link.v.clone().for_each(|i| given[i] = 0.0);
             }
@@ -195,6 +197,7 @@ impl Equations<'_> {
         acceleration: &DVector<f64>,
         control: &DVector<f64>,
     ) -> Result<DVector<f64>> {
+        self.check(v, control)?;
         check_numbers("acceleration", acceleration, v.len())?;
         Ok(self.at.mass_times(acceleration) + self.bias_force(v, control)?)
     }

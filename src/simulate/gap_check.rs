@@ -66,7 +66,9 @@ impl Rollout {
         choices.water.backend = super::Backend::Cpu;
         let panels = Simulator::with_choices(&simulator.scene, choices, None)?;
         let name = |b: usize| simulator.system().bodies[b].name.clone();
-        let (by_run, by_panels) = (across.of(simulator)?, across.of(&panels)?);
+        let (Some(by_run), Some(by_panels)) = (across.of(simulator)?, across.of(&panels)?) else {
+            return Ok(None);
+        };
         Ok(Some(GapCheck {
             time: sample.time,
             gap: gap.distance,
@@ -82,8 +84,6 @@ impl Rollout {
 struct Across<'a> {
     poses: &'a [Pose],
     body: usize,
-    /// Its number in the water.
-    number: usize,
     other: Option<usize>,
     /// Unit vector along which the body moves.
     direction: Vec3,
@@ -94,17 +94,17 @@ impl<'a> Across<'a> {
     fn new(simulator: &Simulator, poses: &'a [Pose], gap: &Gap) -> Option<Self> {
         let system = simulator.system();
         let volume = |b: usize| system.bodies[b].volume;
-        let number = |body: usize| system.submerged().position(|(b, _)| b == body);
+        let seen = |body: usize| system.submerged().any(|(b, _)| b == body);
         let (smaller, other) = match gap.second {
             Other::Body(b) if volume(b) < volume(gap.first) => (b, Some(gap.first)),
             Other::Body(b) => (gap.first, Some(b)),
             Other::Wall(_) => (gap.first, None),
         };
         // What nothing moves isn't in the water where bodies don't feel each other.
-        let (body, other, number) = match (number(smaller), other) {
-            (Some(number), other) => (smaller, other, number),
-            (None, Some(b)) => (b, Some(smaller), number(b)?),
-            (None, None) => return None,
+        let (body, other) = match other {
+            _ if seen(smaller) => (smaller, other),
+            Some(b) if seen(b) => (b, Some(smaller)),
+            _ => return None,
         };
         let step = STEP * gap.edge;
         let distance = |shift: Vec3| {
@@ -120,18 +120,20 @@ impl<'a> Across<'a> {
         Some(Self {
             poses,
             body,
-            number,
             other,
             direction: Vec3::from_fn(|axis, _| slope(axis)).try_normalize(0.0)?,
         })
     }
 
-    /// Added mass of the body along it and its slope, density 1: m³, m².
-    fn of(&self, simulator: &Simulator) -> Result<(f64, f64)> {
+    /// Added mass of the body along it and its slope, density 1: m³, m². None of a simulator in whose water it isn't; which bodies are, and so
+    /// their numbers there, is each fidelity's own.
+    fn of(&self, simulator: &Simulator) -> Result<Option<(f64, f64)>> {
         let system = simulator.system();
         let in_water: Vec<usize> = system.submerged().map(|(b, _)| b).collect();
         let poses: Vec<Pose> = in_water.iter().map(|b| self.poses[*b]).collect();
-        let own = self.number;
+        let Some(own) = in_water.iter().position(|b| *b == self.body) else {
+            return Ok(None);
+        };
         let mut twist = DMatrix::zeros(6 * poses.len(), 1);
         let along = self.poses[self.body].rotation.tr_mul(&self.direction);
         twist.fixed_view_mut::<3, 1>(6 * own, 0).copy_from(&along);
@@ -139,6 +141,6 @@ impl<'a> Across<'a> {
         let one = DVector::from_element(1, 1.0);
         let wrench: Vec6 = found.gradient(&one, &one)?[own];
         let slope = wrench.fixed_rows::<3>(0).dot(&self.direction);
-        Ok((twist.dot(found.momenta()), slope))
+        Ok(Some((twist.dot(found.momenta()), slope)))
     }
 }

@@ -7,7 +7,7 @@ use crate::assembly::bearing;
 use crate::coupling::lubrication::PlacedBearing;
 use crate::dynamics::Drive;
 use crate::geometry::{Gap, Other, WallSurface};
-use crate::scene::WATER_VISCOSITY;
+use crate::scene::{Lubrication, WATER_VISCOSITY};
 use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
@@ -89,7 +89,12 @@ impl Rollout {
             Other::Wall(_) => false,
         };
         let mut forces = simulator.scene.lubrications();
-        let acting = forces.find(|(_, force)| !neighbours && force.acts_between(&names));
+        // Past a force's reach nothing of it is left.
+        let reaches = |force: &Lubrication| force.reach.is_none_or(|reach| gap.distance < reach);
+        let acts =
+            |force: &Lubrication| !neighbours && force.acts_between(&names) && reaches(force);
+        let acting = forces.find(|(_, force)| acts(force));
+        let reach = acting.and_then(|(_, force)| force.reach);
         let any = acting.or_else(|| simulator.scene.lubrications().next());
         let value = |(i, _): (usize, _), what: &str| {
             let name = format!("{}.{what}", simulator.scene.force_name(i));
@@ -100,7 +105,8 @@ impl Rollout {
         let speed = self.speed(&gap);
         let viscosity = dynamic / density;
         let film_reynolds = h * speed / viscosity;
-        let film = Film::new(simulator, &self.samples()[at].poses, &gap, roughness)?;
+        let poses = &self.samples()[at].poses;
+        let film = Film::new(simulator, poses, &gap, roughness, reach)?;
         let inertia = match &film {
             Some(film) => film.inertia(simulator, &self.samples()[at].q)?,
             None => None,
@@ -150,11 +156,12 @@ impl Film {
         poses: &[Pose],
         gap: &Gap,
         roughness: f64,
+        reach: Option<f64>,
     ) -> Result<Option<Self>> {
         let scene = &simulator.scene;
         let surfaces = simulator.assembled.surfaces(scene, simulator.choices())?;
-        let Some((first, second, bearing)) = bearing(scene, surfaces, (gap.first, gap.second))?
-        else {
+        let sides = (gap.first, gap.second);
+        let Some((first, second, bearing)) = bearing(scene, surfaces, sides, reach)? else {
             return Ok(None);
         };
         let other = second.map_or(Pose::identity(), |b| poses[b]);

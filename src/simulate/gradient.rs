@@ -143,7 +143,8 @@ impl Sums {
         simulator.forget_driven(&mut out.state.q, &mut out.v);
         self.gradient.initial.q = out.state.q;
         self.gradient.initial.v = out.v;
-        self.gradient.warnings.extend(self.grown.warning(simulator));
+        let warning = self.grown.warning(simulator, state.step);
+        self.gradient.warnings.extend(warning);
         Ok(())
     }
 }

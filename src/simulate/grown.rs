@@ -62,9 +62,10 @@ impl Grown {
         self.last = size.of;
     }
 
-    /// What the user should know of it.
-    pub fn warning(&self, simulator: &Simulator) -> Option<String> {
+    /// What the user should know of it, of a run whose first state is number `first`.
+    pub fn warning(&self, simulator: &Simulator, first: usize) -> Option<String> {
         let (factor, from, size, n) = self.most?;
+        let (from, n) = (first + from, first + n);
         let time = |n: usize| readable(n as f64 * simulator.time_step());
         let labels = simulator.scene.velocity_labels();
         let label = labels.get(size.at).map_or("", String::as_str);

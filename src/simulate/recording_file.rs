@@ -71,8 +71,13 @@ impl Serialize for Recording {
         map.serialize_entry("scene", &self.scene)?;
         map.serialize_entry("dt", &self.dt)?;
         for (key, name) in [("coordinates", "q"), ("velocities", "v")] {
-            if let Some(o) = self.observables.iter().find(|o| o.name == name) {
-                map.serialize_entry(key, &o.labels)?;
+            let Some(o) = self.observables.iter().find(|o| o.name == name) else {
+                continue;
+            };
+            // One of the observables has the name of these labels.
+            match self.observables.iter().any(|o| o.name == key) {
+                true => map.serialize_entry(&format!("{key}_labels"), &o.labels)?,
+                false => map.serialize_entry(key, &o.labels)?,
             }
         }
         map.serialize_entry("time", &self.time)?;

@@ -2,6 +2,7 @@
 
 use super::{Simulator, finite};
 use crate::dynamics::{Drive, State};
+use crate::multibody::Link;
 use crate::{Error, Result};
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -106,14 +107,19 @@ impl Simulator {
                 x != 0.0 && (x - y).abs() > SAME * x.abs().max(y.abs())
             };
             if let Some(i) = (0..given.len()).find(differs) {
-                return Err(Error::input(
-                    format!("initial {name}: {}", labels[i]),
-                    given[i],
-                    format!(
+                let moved = self.system().drives.iter().zip(self.system().tree.links());
+                let locked = |(drive, link): (&Drive, &Link)| {
+                    *drive == Drive::Locked && name == "v" && link.v.contains(&i)
+                };
+                let right = match moved.into_iter().any(locked) {
+                    true => "the joint is locked and can't move; give 0".into(),
+                    false => format!(
                         "the joint is driven, and at t = {time} s its motion has {}; give that, or 0",
                         right[i]
                     ),
-                ));
+                };
+                let place = format!("initial {name}: {}", labels[i]);
+                return Err(Error::input(place, given[i], right));
             }
         }
         Ok((driven_q, driven_v))

@@ -93,7 +93,6 @@ impl<'a> Trajectory<'a> {
     fn input(
         &self,
         mut control: DVector<f64>,
-        index: usize,
         state: &State,
         sample: &Sample,
     ) -> Result<(Input, usize)> {
@@ -113,7 +112,7 @@ impl<'a> Trajectory<'a> {
         }
         if let Some(bad) = control.iter().position(|x| !x.is_finite()) {
             return Err(Error::input(
-                format!("control {bad} at step {index}"),
+                format!("control {bad} at step {}", state.step),
                 control[bad],
                 "must be finite",
             ));
@@ -172,7 +171,6 @@ impl<'a> Trajectory<'a> {
     /// A step whose open-loop controls `decide` gives from what is observed before it.
     pub(super) fn advance(
         &self,
-        index: usize,
         state: &State,
         decide: impl FnOnce(&Sample) -> Result<DVector<f64>>,
     ) -> Result<(State, Sample, StepRecord)> {
@@ -181,7 +179,7 @@ impl<'a> Trajectory<'a> {
             let e = self.stepper.linearise(&state.q, self.stepper.time(state))?;
             let mut sample = self.observe(&e, state)?;
             let control = decide(&sample)?;
-            let (input, mode) = self.input(control, index, state, &sample)?;
+            let (input, mode) = self.input(control, state, &sample)?;
             let step = self.stepper.step(&e, state, &sample.v, &input);
             let clearance = self.simulator.clearance();
             let (mut next, record) = step.map_err(|e| clearance.explain(e))?;
@@ -341,9 +339,7 @@ impl Step for Trajectory<'_> {
     type Error = Error;
 
     fn step(&self, index: usize, state: &State) -> Result<(State, Sample, StepRecord)> {
-        self.advance(index, state, |_| {
-            Ok(self.controls.column(index).into_owned())
-        })
+        self.advance(state, |_| Ok(self.controls.column(index).into_owned()))
     }
 
     fn last(&self, _index: usize, state: &State) -> Result<Sample> {

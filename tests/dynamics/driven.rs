@@ -2,7 +2,7 @@
 
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
+use hydrograd::scene::{Body, Controller, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::{Controls, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 
@@ -79,5 +79,46 @@ fn no_gradient_goes_to_where_a_driven_joint_starts() {
         assert_eq!(state.column(0).amax(), 0.0);
         assert_eq!(state.column(2).amax(), 0.0);
         assert!(state.column(1).amax() > 0.5);
+    }
+}
+
+/// A joint that is locked has no motion: what is wrong with a velocity there is told as that.
+#[test]
+fn a_locked_joint_takes_no_velocity() {
+    let mut scene = Scene::new(Fluid::none());
+    let axis = [1.0, 0.0, 0.0];
+    let body = Body::dry().named("lid").mass(1.0).inertia([0.1; 3]);
+    scene.add(body.joint(Joint::Prismatic { axis }).locked());
+    let mut simulator = Simulator::new(&scene, Settings::default()).unwrap();
+    let start = simulator.set_start(DVector::zeros(1), DVector::from_element(1, 0.1));
+    says(start.unwrap_err(), &["initial v: lid", "locked", "give 0"]);
+}
+
+/// Controls that are played back are those of their times, with steps of any length: a shorter one plays each for as long.
+#[test]
+fn playback_keeps_time() {
+    let mut scene = Scene::new(Fluid::none());
+    scene.time_step = 0.02;
+    let axis = [1.0, 0.0, 0.0];
+    let body = Body::dry().named("cart").mass(2.0).inertia([0.1; 3]);
+    scene.add(body.joint(Joint::Prismatic { axis }).actuated());
+    let rows: Vec<Vec<f64>> = (0..50).map(|n| vec![(0.3 * f64::from(n)).sin()]).collect();
+    // Constant in each step: exact with RK4, whatever part of it a step is.
+    let (mut speed, mut place) = (0.0, 0.0);
+    for row in &rows {
+        place += 0.02 * speed + 0.5 * 0.02 * 0.02 * row[0] / 2.0;
+        speed += 0.02 * row[0] / 2.0;
+    }
+    scene.controller = Some(Controller::Playback { control: rows });
+    for parts in [1, 2, 4, 5] {
+        let settings = Settings::default()
+            .integrator(Integrator::Rk4)
+            .time_step(0.02 / parts as f64);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let controls = Controls::zeros(&simulator, 50 * parts);
+        let rollout = simulator.rollout(&controls).unwrap();
+        let last = rollout.samples().last().unwrap();
+        assert!((last.v[0] - speed).abs() < 1e-12, "{parts}: {}", last.v);
+        assert!((last.q[0] - place).abs() < 1e-12, "{parts}: {}", last.q);
     }
 }

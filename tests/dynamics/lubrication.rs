@@ -242,6 +242,18 @@ fn a_run_tells_which_rules() {
     let found = flow.stokes.unwrap();
     assert!((found / stokes - 1.0).abs() < 0.06, "{found} for {stokes}");
     assert!(flow.advice().is_some());
+    // A force whose reach ends before the gap doesn't act there, and so the run is told the same.
+    let film = |reach: f64| Lubrication::new(1e-6).reach(reach).into();
+    scene.forces = vec![film(0.5e-4)];
+    let short = run(&scene, 4).gap_flow().unwrap().expect("a gap");
+    assert!(!short.lubricated && short.advice().is_some(), "{short:?}");
+    scene.forces = vec![film(2e-3)];
+    assert!(
+        run(&scene, 4)
+            .gap_flow()
+            .unwrap()
+            .is_some_and(|f| f.lubricated)
+    );
 }
 
 /// What a scene may not say, and with what it may not be stepped.

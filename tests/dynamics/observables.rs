@@ -64,6 +64,20 @@ fn every_observable_has_a_label_and_a_value_for_every_entry() {
     ] {
         assert_eq!(columns.iter().filter(|c| **c == name).count(), 1, "{name}");
     }
+    // One key for each thing in the file, also where an observable has the name of the labels of another.
+    let text = serde_json::to_string(&all).unwrap();
+    let values: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for key in [
+        "coordinates",
+        "velocities",
+        "velocities_labels",
+        "v",
+        "time",
+    ] {
+        assert_eq!(text.matches(&format!("\"{key}\":")).count(), 1, "{key}");
+    }
+    assert_eq!(values["velocities_labels"].as_array().unwrap().len(), 6);
+    assert_eq!(values["velocities"].as_array().unwrap().len(), 201);
 }
 
 #[test]

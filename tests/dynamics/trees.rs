@@ -448,5 +448,9 @@ fn a_follower_that_is_held_holds_its_leader() {
         let s = rollout.samples();
         assert_eq!(s[2].q[0], s[4].q[0], "{integrator:?}");
         assert!(s[1].q[0] != s[2].q[0] && s[4].q[0] != s[6].q[0]);
+        // What is told of a state of the run holds it as well: 1 N moves both masses before, and neither then.
+        let told = |n: usize| rollout.loads(n).unwrap().acceleration()[0];
+        assert!((told(1) - 0.5).abs() < 1e-12, "{integrator:?}: {}", told(1));
+        assert_eq!(told(2), 0.0, "{integrator:?}");
     }
 }

@@ -73,6 +73,7 @@ fn playback() -> Playback {
     Playback {
         controls: 2,
         steps: steps.collect(),
+        time_step: 0.01,
     }
 }
 

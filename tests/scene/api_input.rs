@@ -1,8 +1,8 @@
 //! What a program hands to the simulator is checked: parameters, starts, controllers, steps.
 
-use crate::support::example;
+use crate::support::{example, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::Preset;
+use hydrograd::scene::{Body, Fluid, Joint, Preset, Scene};
 use hydrograd::simulate::{Action, ActionBar, Method, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
@@ -312,4 +312,56 @@ fn a_scenes_own_choices_count() {
         .faces()
         .len();
     assert_eq!((simulator.time_step(), surface), (0.01, 320));
+}
+
+/// Steps are counted from where the run began, in whatever piece of it something is wrong.
+#[test]
+fn errors_name_the_step_of_the_run() {
+    #[derive(Clone)]
+    struct Broken;
+    impl Policy for Broken {
+        fn act(&self, o: &Observation) -> Result<Action> {
+            let control = if o.step == 1002 { f64::NAN } else { 0.0 };
+            Ok(Action {
+                control: vec![control; 6],
+                ..Action::default()
+            })
+        }
+        fn act_vjp(&self, _: &Observation, _: &DVector<f64>) -> Result<ActionBar> {
+            Ok(ActionBar::default())
+        }
+        fn with_gains(&self, _: &[f64]) -> Result<Box<dyn Policy>> {
+            Ok(Box::new(self.clone()))
+        }
+    }
+    let mut scene = Scene::new(Fluid::none());
+    let body = Body::dry().named("cart").mass(1.0).inertia([0.1; 3]);
+    scene.add(body.joint(Joint::Free).actuated());
+    let mut simulator = Simulator::new(&scene, Settings::default()).unwrap();
+    simulator.set_policy(Box::new(Broken));
+    let (q, v) = simulator.start();
+    let state = simulator.state(1000, q, v).unwrap();
+    let run = simulator.rollout_from(&state, &Controls::zeros(&simulator, 5), |_| {
+        std::ops::ControlFlow::Continue(())
+    });
+    says(run.err().unwrap(), &["at step 1002"]);
+}
+
+/// Numbers of the wrong length are errors of the equations of motion, not of what they are made of.
+#[test]
+fn equations_of_motion_check_lengths() {
+    let simulator = simulator("kirchhoff_ellipsoid");
+    let (q, _) = simulator.start();
+    let equations = simulator.equations(q).unwrap();
+    let (none, short) = (simulator.no_control(), DVector::zeros(5));
+    says(
+        equations.force(&short, &short, &none).unwrap_err(),
+        &["velocity v"],
+    );
+    let right = DVector::zeros(6);
+    says(
+        equations.force(&right, &short, &none).unwrap_err(),
+        &["acceleration"],
+    );
+    assert!(equations.force(&right, &right, &none).is_ok());
 }

@@ -122,19 +122,8 @@ impl Stepper<'_> {
             moved: vec![false; nv],
             is_driven: vec![false; nv],
         };
-        let links = self.system.tree.links();
-        let held = |b: usize| held.get(b).copied().unwrap_or(false);
-        // A joint is held with those that follow it.
-        let followers = links
-            .iter()
-            .enumerate()
-            .filter_map(|(b, link)| Some((b, link.follows?)));
-        let leaders: Vec<usize> = followers
-            .filter(|(b, _)| held(*b))
-            .map(|(_, follows)| follows.leader)
-            .collect();
-        for (b, link) in links.iter().enumerate() {
-            let is_held = held(b) || leaders.contains(&b);
+        let held = self.system.tree.held(held);
+        for ((b, link), is_held) in self.system.tree.links().iter().enumerate().zip(held) {
             for (k, i) in link.v.clone().enumerate() {
                 match &self.system.drives[b] {
                     Drive::Motion(motions) => {

@@ -15,7 +15,7 @@ use std::collections::hash_map::Entry;
 /// Deepest nesting of nodes, and most geometries that they may place.
 const DEEPEST: usize = 64;
 const MOST_PLACED: usize = 10_000;
-/// Most faces of all together.
+/// Most faces, and most vertices, of all together.
 const MOST_FACES: usize = 20_000_000;
 
 /// Reads all that the scene shows, in m; all geometries as they stand if there is no scene.
@@ -168,8 +168,11 @@ fn matrix(name: &str, element: &Node) -> Result<Matrix4<f64>, String> {
 
 /// Adds a geometry where it is placed.
 fn add(geometry: &Geometry, at: &Matrix4<f64>, raw: &mut Raw) -> Result<(), String> {
-    if raw.faces.len() + geometry.triangles() > MOST_FACES {
-        return Err(format!("more than {MOST_FACES} faces; export fewer"));
+    let faces = raw.faces.len() + geometry.triangles();
+    if faces.max(raw.vertices.len() + geometry.vertices.len()) > MOST_FACES {
+        return Err(format!(
+            "more than {MOST_FACES} faces or vertices; export fewer"
+        ));
     }
     let first = raw.vertices.len();
     let vertices = geometry.vertices.iter();

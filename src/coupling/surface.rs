@@ -47,7 +47,7 @@ pub struct Motion<'a> {
 pub struct SurfacePotential {
     /// φ, m²/s.
     pub value: Vec<f64>,
-    /// Its rate at points that go with the body, m²/s²; zeros where it wasn't asked for.
+    /// Its rate at points that go with the body, m²/s²; not to be read where it wasn't asked for.
     pub rate: Vec<f64>,
     /// What films add to it, where there are any at the body: the rest is that of bodies held apart.
     pub film: Option<FilmLoad>,

@@ -62,18 +62,23 @@ impl Opposite {
             Kind::Solid(solid) => solid.field(p),
             Kind::Wall(wall) => Field::flat(wall.height(p), wall.normal),
             Kind::Mesh(tree) => {
-                let (nearest, face) = tree.closest(p);
-                let triangle = &tree.triangles[face];
-                match triangle.closest(p).1 {
+                let nearest = tree.nearest(p, 0.0);
+                let triangle = &tree.triangles[nearest.face];
+                let away = p - nearest.point;
+                let round = match nearest.feature {
                     Feature::Face => {
-                        let height = (p - nearest).dot(&triangle.normal);
-                        Field::flat(height, triangle.normal)
+                        return Field::flat(away.dot(&triangle.normal), triangle.normal);
                     }
                     Feature::Edge(k) => {
                         let [a, b] = [0, 1].map(|i| triangle.corners[(k + i) % 3]);
-                        Field::round(p - nearest, Some(&(b - a).normalize()), 0.0)
+                        Field::round(away, Some(&(b - a).normalize()), 0.0)
                     }
-                    Feature::Corner(_) => Field::round(p - nearest, None, 0.0),
+                    Feature::Corner(_) => Field::round(away, None, 0.0),
+                };
+                // In a body an edge or a corner is the nearest where the surface has a notch.
+                match nearest.square > 0.0 && tree.inside(p, &nearest) {
+                    true => round.negated(),
+                    false => round,
                 }
             }
         }
@@ -106,5 +111,57 @@ impl Solid {
             ..own
         };
         about.rotated(&self.offset.rotation)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A prism along z over an L whose inner edge is at x = y = 1.
+    fn notched() -> TriMesh {
+        let outline = [[0., 0.], [2., 0.], [2., 1.], [1., 1.], [1., 2.], [0., 2.]];
+        let caps = [[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]];
+        let level = |z: f64| outline.map(|[x, y]| Vec3::new(x, y, z));
+        let sides = (0..6).flat_map(|i| {
+            let j = (i + 1) % 6;
+            [[i, j, j + 6], [i, j + 6, i + 6]]
+        });
+        let ends = caps
+            .into_iter()
+            .flat_map(|[a, b, c]: [usize; 3]| [[a, c, b], [a + 6, b + 6, c + 6]]);
+        let faces = sides.chain(ends).collect();
+        TriMesh::new("L", [level(-1.0), level(1.0)].concat(), faces).unwrap()
+    }
+
+    #[test]
+    fn in_a_notched_body_distances_are_negative() {
+        // Split, the inner edge has a vertex in its middle.
+        for mesh in [notched(), notched().split()] {
+            let surface = Opposite::of_body(None, &mesh);
+            let inside = surface.field(&Vec3::new(0.9, 0.9, 0.0));
+            assert!((inside.distance + 0.1 * 2f64.sqrt()).abs() < 1e-15);
+            // By the inner edge from inside, over a face, by an outer edge and an outer corner.
+            for (p, sign) in [
+                ([0.9, 0.85, 0.3], -1.0),
+                ([0.95, 0.7, -0.4], -1.0),
+                ([1.1, 1.3, 0.3], 1.0),
+                ([2.1, -0.2, 0.3], 1.0),
+                ([2.1, -0.2, 1.2], 1.0),
+            ] {
+                let p = Vec3::from(p);
+                let field = surface.field(&p);
+                assert!(sign * field.distance > 0.0, "{p:?}: {field:?}");
+                let h = 1e-5;
+                for k in 0..3 {
+                    let [above, below] = [h, -h].map(|h| surface.field(&(p + Vec3::ith(k, h))));
+                    let slope = (above.distance - below.distance) / (2.0 * h);
+                    assert!((slope - field.gradient[k]).abs() < 1e-8, "{p:?} {k}");
+                    let bend = (above.gradient - below.gradient) / (2.0 * h);
+                    let off = (bend - field.hessian.column(k)).amax();
+                    assert!(off < 1e-6, "{p:?} {k}: {off:e}");
+                }
+            }
+        }
     }
 }

@@ -124,7 +124,7 @@ impl MeshTree {
     }
 
     /// Closest point to `p`; given up once it is nearer than the root of `stop`.
-    fn nearest(&self, p: &Vec3, stop: f64) -> Nearest {
+    pub fn nearest(&self, p: &Vec3, stop: f64) -> Nearest {
         let mut best = Nearest {
             square: f64::INFINITY,
             point: *p,
@@ -169,7 +169,7 @@ impl MeshTree {
     /// # References
     /// Bærentzen and Aanæs 2005, Signed distance computation using the angle weighted
     /// pseudonormal, IEEE Trans. Vis. Comput. Graphics 11(3).
-    fn inside(&self, p: &Vec3, nearest: &Nearest) -> bool {
+    pub fn inside(&self, p: &Vec3, nearest: &Nearest) -> bool {
         let normal = match nearest.feature {
             Feature::Face => self.triangles[nearest.face].normal,
             Feature::Edge(k) => self.edge_normals[nearest.face][k],
@@ -271,11 +271,13 @@ impl MeshTree {
 }
 
 /// The closest point found so far.
-struct Nearest {
-    square: f64,
-    point: Vec3,
-    face: usize,
-    feature: Feature,
+pub(super) struct Nearest {
+    /// Square of its distance, m².
+    pub square: f64,
+    pub point: Vec3,
+    /// Its face, in the order of the tree, and where in it the point lies.
+    pub face: usize,
+    pub feature: Feature,
 }
 
 /// Whether the segment from `from` along `along` meets a box.

@@ -352,7 +352,7 @@ impl Clearance {
             Other::Wall(_) => 0.5 * limit,
         };
         Some(format!(
-            "{}: the smallest gap, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
+            "{}: the gap that is narrowest against what is resolved, {:.3e} m at t = {} s, is {ratio:.2} of what their compressed sources \
          resolve ({limit:.3e} m): the force across it may be off by {:.0} %, the added mass along it by {:.1} % (estimated; `check_gap` measures it); turn films on, or end the run \
          before",
             self.place(&gap),

@@ -49,7 +49,7 @@ pub(crate) struct Changed<'a> {
 
 impl ShapeChange {
     /// Those that `wanted` names in a scene whose bodies have these surfaces: `body.size.y`, all that begin with a name (`body`, `body.size`), or `*` for all of all bodies.
-    /// A mesh's vertices are asked for as `body.vertex` (all) or `body.vertex.17`; `*` leaves them out.
+    /// A mesh's vertices are asked for as `body.vertex` (all that faces use) or `body.vertex.17`, with the numbers that they have in the shape; `*` leaves them out.
     ///
     /// # Errors
     /// A name that fits none, with those that there are.
@@ -103,10 +103,11 @@ impl ShapeChange {
             if !shape.is_mesh() || !body.refine.is_empty() {
                 continue;
             }
-            for (v, x) in surface.mesh.vertices().iter().enumerate() {
+            let numbers = given_numbers(shape, surface.mesh.vertices().len());
+            for (v, (x, given)) in surface.mesh.vertices().iter().zip(&numbers).enumerate() {
                 let local = offset.apply_inverse(x);
                 for (axis, letter) in AXES.into_iter().enumerate() {
-                    let name = format!("{VERTEX}.{v}.{letter}");
+                    let name = format!("{VERTEX}.{given}.{letter}");
                     if asked(&name, true) {
                         out.push(Self {
                             body: b,
@@ -251,6 +252,16 @@ impl Changed<'_> {
     }
 }
 
+/// The number that each of the `count` vertices of a shape's mesh has in the shape as given, by which [`Scene::with_shape_parameter`] sets it: the mesh leaves out vertices that no face uses.
+fn given_numbers(shape: &Shape, count: usize) -> Vec<usize> {
+    let Shape::Triangles { vertices, faces } = shape else {
+        return (0..count).collect();
+    };
+    let mut used = vec![false; vertices.len()];
+    faces.iter().flatten().for_each(|&v| used[v] = true);
+    (0..vertices.len()).filter(|&v| used[v]).collect()
+}
+
 /// The error of a name that no shape parameter has.
 fn unknown(scene: &Scene, name: &str) -> Error {
     let mut known = Vec::new();
@@ -259,7 +270,10 @@ fn unknown(scene: &Scene, name: &str) -> Error {
         let own = shape.parameters().into_iter();
         known.extend(own.map(|(name, _)| format!("{}.{name}", body.name)));
         if shape.is_mesh() && body.refine.is_empty() {
-            known.push(format!("{}.{VERTEX} (all vertices of the mesh)", body.name));
+            known.push(format!(
+                "{}.{VERTEX} (all vertices that its faces use)",
+                body.name
+            ));
         }
     }
     Error::input(

@@ -88,14 +88,19 @@ impl<'a> SubmergedBody<'a> {
         })
     }
 
-    /// Whether both have the same surface in their own frames.
+    /// Whether both have the same surface in their own frames, and the same coarser mesh of it: a mesh has none, where a shape by formula with the same faces does.
     pub fn equal(&self, other: &SubmergedBody) -> bool {
-        fn parts<'b>(body: &SubmergedBody<'b>) -> Option<(&'b [Vec3], &'b [[usize; 3]])> {
-            body.mesh.map(|m| (m.vertices(), m.faces()))
+        type Parts<'b> = (&'b [Vec3], &'b [[usize; 3]]);
+        fn parts(mesh: &TriMesh) -> Parts<'_> {
+            (mesh.vertices(), mesh.faces())
+        }
+        fn coarse<'b>(body: &SubmergedBody<'b>) -> Option<(Parts<'b>, Option<f64>)> {
+            body.coarse.map(|c| (parts(&c.mesh), c.ratio))
         }
         self.regions == other.regions
             && self.ellipsoid == other.ellipsoid
-            && parts(self) == parts(other)
+            && self.mesh.map(parts) == other.mesh.map(parts)
+            && coarse(self) == coarse(other)
     }
 }
 

@@ -279,6 +279,37 @@ fn every_vertex_of_a_mesh() {
     assert!(off < 1e-6, "{off:e}");
 }
 
+/// A vertex that no face uses has its number, but no entry: the others keep those by which the scene sets them.
+#[test]
+fn a_loose_vertex_does_not_shift_the_others() {
+    let vertices: [[f64; 3]; 5] = [
+        [5.0, 5.0, 5.0],
+        [-0.3, -0.2, -0.25],
+        [0.5, -0.1, -0.2],
+        [0.0, 0.6, -0.15],
+        [0.1, 0.05, 0.45],
+    ];
+    let faces: [[usize; 3]; 4] = [[1, 3, 2], [1, 2, 4], [1, 4, 3], [2, 3, 4]];
+    let scene = scene(&[Shape::triangles(vertices, faces)]);
+    let settings = settings(Fidelity::Isolated, Integrator::Midpoint)
+        .shape_parameters(vec!["body0.vertex".into()]);
+    let simulator = Simulator::new(&scene, settings.clone()).unwrap();
+    for (v, x) in vertices.iter().enumerate() {
+        for (axis, x) in ["x", "y", "z"].iter().zip(x) {
+            let value = simulator
+                .parameters()
+                .get(&format!("body0.vertex.{v}.{axis}"));
+            match v {
+                0 => assert!(value.is_err()),
+                _ => assert!((value.unwrap() - x).abs() < 1e-12),
+            }
+        }
+    }
+    let off = worst(&scene, &settings, 1e-4);
+    println!("{off:.1e}");
+    assert!(off < 1e-6, "{off:e}");
+}
+
 /// Forward mode against the transpose: states, and an observable that has masses and inertias in it.
 #[test]
 fn forward_mode_takes_what_follows_along() {

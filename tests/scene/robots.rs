@@ -346,63 +346,8 @@ fn hulls_of_plates_keep_their_volume() {
     assert_eq!(said, !near, "{} faces: {:?}", faces.len(), report.notes);
 }
 
-/// A cube of edge 1 as OBJ and as DAE: nodes within nodes, each with a matrix, and a unit; the same cube twice.
+/// A cube of edge 1.
 const CUBE: &str = include_str!("../fuzz/corpus/mesh/cube.obj");
-
-fn dae(scene: &str, unit: f64) -> String {
-    format!(
-        r##"<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit meter="{unit}"/><up_axis>Z_UP</up_axis></asset>
-<library_geometries><geometry id="tetra"><mesh>
-<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
-<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>
-</mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s">{scene}</visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>"##
-    )
-}
-
-#[test]
-fn nodes_of_collada_are_placed() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("tetra.dae");
-    let read = |scene: &str, unit: f64| {
-        std::fs::write(&path, dae(scene, unit)).unwrap();
-        hydrograd::shape::file::read_unchecked(&path, 1.0)
-    };
-    let shown = r##"<instance_geometry url="#tetra"/>"##;
-    // Moved, then turned by a quarter about z, then twice as large: in that order from outside.
-    let inner = format!(
-        "<node><translate>10 0 0</translate><node><rotate>0 0 1 90</rotate><node><scale>2 2 2</scale>{shown}</node></node></node>"
-    );
-    let mesh = read(&inner, 0.1).unwrap().into_mesh().unwrap();
-    let [low, high] = mesh.bounds();
-    assert!((low - Vector3::new(0.8, 0.0, 0.0)).norm() < 1e-6, "{low}");
-    assert!((high - Vector3::new(1.0, 0.2, 0.2)).norm() < 1e-6, "{high}");
-    // A mirrored one is turned outward again, and one geometry may be shown twice.
-    let twice = format!(
-        "<node>{shown}</node><node><matrix>-1 0 0 -3 0 1 0 0 0 0 1 0 0 0 0 1</matrix>{shown}</node>"
-    );
-    let mesh = read(&twice, 1.0).unwrap().into_mesh().unwrap();
-    assert_eq!(mesh.faces().len(), 8);
-    assert!((mesh.mass_properties().volume - 1.0 / 3.0).abs() < 1e-6);
-    for (bad, words) in [
-        (
-            "<node><instance_geometry url=\"#no\"/></node>",
-            "leads nowhere",
-        ),
-        ("<node><matrix>1 2 3</matrix></node>", "16 finite numbers"),
-        ("<node><skew>1 2 3 4 5 6 7</skew></node>", "isn't read"),
-    ] {
-        says(
-            read(bad, 1.0).unwrap_err().to_string(),
-            &["tetra.dae", words],
-        );
-    }
-}
 
 #[test]
 fn meshes_are_found_scaled_and_replaced() {

@@ -477,7 +477,7 @@ fn nested_and_coincident_pieces_are_refused() {
     }
 }
 
-/// Verdicts, and the pairs, are those of all pairs one by one, in any order of the faces and in any unit.
+/// As many pairs are found in any order of the faces and in any unit. That they are those of all pairs one by one is held where the search is.
 #[test]
 fn pairs_do_not_depend_on_order_and_unit() {
     let (v, f) = both(

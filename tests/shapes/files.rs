@@ -11,13 +11,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
 
-fn body() -> TriMesh {
+pub fn body() -> TriMesh {
     let shape = parse_shape("ellipsoid:1,0.8,0.3").unwrap();
     build(&shape, Path::new("."), Some(320)).unwrap()
 }
 
 /// A cube of polygons: 8 vertices, 6 quadrilaterals, counter-clockwise from outside.
-const CUBE: [[i32; 3]; 8] = [
+pub const CUBE: [[i32; 3]; 8] = [
     [0, 0, 0],
     [1, 0, 0],
     [1, 1, 0],
@@ -27,7 +27,7 @@ const CUBE: [[i32; 3]; 8] = [
     [1, 1, 1],
     [0, 1, 1],
 ];
-const SIDES: [[usize; 4]; 6] = [
+pub const SIDES: [[usize; 4]; 6] = [
     [3, 2, 1, 0],
     [4, 5, 6, 7],
     [0, 1, 5, 4],
@@ -36,13 +36,13 @@ const SIDES: [[usize; 4]; 6] = [
     [3, 0, 4, 7],
 ];
 
-fn put(dir: &TempDir, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
+pub fn put(dir: &TempDir, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
     let path = dir.path().join(name);
     std::fs::write(&path, contents).unwrap();
     path
 }
 
-fn stl_text(mesh: &TriMesh) -> String {
+pub fn stl_text(mesh: &TriMesh) -> String {
     let mut s = "solid body\n".to_owned();
     for f in 0..mesh.faces().len() {
         let n = mesh.normal(f);
@@ -74,7 +74,7 @@ fn stl_binary(mesh: &TriMesh, header: &str) -> Vec<u8> {
     b
 }
 
-fn ply_text(mesh: &TriMesh) -> String {
+pub fn ply_text(mesh: &TriMesh) -> String {
     let mut s = ply_header("ascii", "double", mesh.vertices().len(), mesh.faces().len());
     for p in mesh.vertices() {
         writeln!(s, "{:e} {:e} {:e}", p.x, p.y, p.z).unwrap();
@@ -85,7 +85,7 @@ fn ply_text(mesh: &TriMesh) -> String {
     s
 }
 
-fn ply_header(format: &str, number: &str, vertices: usize, faces: usize) -> String {
+pub fn ply_header(format: &str, number: &str, vertices: usize, faces: usize) -> String {
     format!(
         "ply\nformat {format} 1.0\ncomment made by hand\nelement vertex {vertices}\n\
          property {number} x\nproperty {number} y\nproperty {number} z\nelement face {faces}\n\

@@ -8,6 +8,8 @@ mod gaps;
 mod primitives;
 mod prisms;
 mod refine;
+#[cfg(feature = "meshio")]
+mod vertices;
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -307,7 +307,7 @@ fn mass_properties_survive_distance_and_rotation() {
     assert!((there.centroid - far).norm() < 1e-9);
     let expected = turn * here.inertia * turn.transpose();
     assert!((there.inertia - expected).amax() < 1e-8 * expected.trace());
-    // A body that isn't convex and not about its centroid: a box with a slanted notch, from two.
+    // Twice as large, about a point that isn't its centroid.
     let moved = body.transformed(&Pose::new(turn, Vec3::new(0.1, 0.2, -0.3)));
     let scaled = moved.scaled(2.0).unwrap().mass_properties();
     let original = moved.mass_properties();

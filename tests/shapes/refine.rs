@@ -268,6 +268,13 @@ fn regions_that_can_not_be_are_refused_by_name() {
         ball(corner, 10.0, 1e-3),
         &["refine[1].edge", "0.001", "e7 faces", "adds at most", &most],
     );
+    // The region that asks for them is named, not the one with the shortest edge.
+    let few = ball(corner, 1e-3, 1e-4);
+    let many = ball(corner, 10.0, 1.5e-3);
+    for (regions, name) in [([few, many], "refine[1]"), ([many, few], "refine[0]")] {
+        let error = shape::refine(&base, &shape, &regions, "body \"box\"").unwrap_err();
+        says(error, &[&format!("{name}.edge"), "0.0015", "e7 faces"]);
+    }
 }
 
 #[test]

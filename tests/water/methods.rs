@@ -6,7 +6,7 @@ use crate::support::{mesh, says};
 use hydrograd::adjoint::lie::{Mat6, Vec3, skew};
 use hydrograd::boundary::{BodyBoundary, MfsSettings, PanelBoundary, Response};
 use hydrograd::scene::Shape;
-use hydrograd::{Error, TriMesh};
+use hydrograd::{Body, Error, Fidelity, Fluid, Scene, Settings, Simulator, TriMesh};
 
 #[derive(Clone, Copy, Debug)]
 enum Method {
@@ -174,4 +174,34 @@ fn bad_surfaces_are_errors() {
     let mut unused = v.clone();
     unused.push(Vec3::new(0.1, 0.0, 0.0));
     assert_eq!(new(&unused, &f).unwrap(), new(&v, &f).unwrap());
+}
+
+/// A box by formula, whose added mass is extrapolated from two meshes, beside a mesh of the same faces, which is the only one of its body: neither takes the other's, whichever comes first.
+#[test]
+fn equal_faces_do_not_make_equal_bodies() {
+    let shape = Shape::cuboid([1.0, 0.4, 0.7]).faces(300);
+    let faces = mesh(&shape, 300);
+    let vertices: Vec<[f64; 3]> = faces.vertices().iter().map(|x| (*x).into()).collect();
+    let triangles = Shape::triangles(vertices, faces.faces());
+    let own = |shapes: &[&Shape]| -> Vec<Mat6> {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        for (k, shape) in shapes.iter().enumerate() {
+            let body = Body::new((*shape).clone()).density(1200.0);
+            scene.add(body.at([0.0, 5.0 * k as f64, 0.0]));
+        }
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let found = simulator.added_mass().unwrap();
+        (0..shapes.len()).map(|k| found.own(k)).collect()
+    };
+    let [a, b] = [&shape, &triangles].map(|s| own(&[s])[0]);
+    assert!((a - b).amax() > 1e-4 * a.amax());
+    for (shapes, alone) in [
+        ([&shape, &triangles], [a, b]),
+        ([&triangles, &shape], [b, a]),
+    ] {
+        for (found, alone) in own(&shapes).iter().zip(&alone) {
+            assert!((found - alone).amax() < 1e-12 * alone.amax());
+        }
+    }
 }

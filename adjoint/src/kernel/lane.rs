@@ -20,7 +20,7 @@ pub(crate) trait Lane:
     fn neg_mul_add(self, b: Self, c: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
-    /// Inverse hyperbolic tangent, of numbers from 0 to 1; the largest number below 1 for 1.
+    /// Inverse hyperbolic tangent, of numbers from 0 to 1; from 1 − `f64::EPSILON` on that of this.
     fn artanh(self) -> Self;
     /// Angle of the point (x, y) = (`x`, `self`), in (−π, π].
     fn atan2(self, x: Self) -> Self;

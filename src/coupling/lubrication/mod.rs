@@ -18,7 +18,7 @@
 //! finite at contact.
 //!
 //! It is solved by elements on one body's own surface that follow 1/H² (`element`), whose faces are cut smaller, on the exact shape where there is one, until
-//! the thickness changes by a factor of about two within any (`patch`): a ball over a wall at a gap of a thousandth of its radius presses on a spot far smaller than a face. How faces are cut
+//! the thickness changes by a factor of about three within any (`patch`): a ball over a wall at a gap of a thousandth of its radius presses on a spot far smaller than a face. How faces are cut
 //! is a decision of the pose: derivatives keep it, and C jumps where it changes by what the discretisation is off there, which no
 //! energy comes from.
 //!

@@ -111,9 +111,9 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         return Ok(());
     }
     let symmetric = 0.5 * (&energy + energy.transpose());
-    let scaled = DMatrix::from_fn(k, k, |i, j| {
-        symmetric[(i, j)] / (own[i].max(f64::MIN_POSITIVE) * own[j].max(f64::MIN_POSITIVE)).sqrt()
-    });
+    // What moves no body in the water has nothing to be scaled by. Roots by themselves: a product of small numbers may be none.
+    let scale = |i: usize| if own[i] > 0.0 { own[i].sqrt() } else { 1.0 };
+    let scaled = DMatrix::from_fn(k, k, |i, j| symmetric[(i, j)] / scale(i) / scale(j));
     let lowest = scaled.symmetric_eigenvalues().min();
     Err(Error::Unresolved {
         place: format!("bodies {}", reduced.names.join(", ")),
@@ -124,4 +124,42 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
                  full"
             .into(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adjoint::lie::Mat6;
+    use crate::coupling::reduced::{CompressedParts, Fit, ReducedBody};
+    use std::sync::Arc;
+
+    /// Two balls, and a third motion, of a joint of a body that isn't in the water.
+    #[test]
+    fn a_dry_joint_leaves_the_error_a_number() {
+        let parts = CompressedParts {
+            name: "ball".into(),
+            points: vec![Vec3::zeros()],
+            modes: DMatrix::zeros(1, 0),
+            strengths: DMatrix::zeros(1, 6),
+            added_mass: Mat6::identity(),
+            centre: Vec3::zeros(),
+            radius: 1.0,
+            volume: 4.0,
+            fit: Fit::default(),
+        };
+        let ball = Arc::new(ReducedBody::new(parts).unwrap());
+        let reduced = Reduced::new(vec![ball; 2], &[], |_, _| None).unwrap();
+        let mut basis = DMatrix::zeros(12, 3);
+        (basis[(0, 0)], basis[(6, 1)]) = (1.0, 1.0);
+        assert!(check_energy(&reduced, &basis, &basis).is_ok());
+        // More between them than their own.
+        let mut momenta = basis.clone();
+        (momenta[(0, 1)], momenta[(6, 0)]) = (2.0, 2.0);
+        let error = check_energy(&reduced, &basis, &momenta).unwrap_err();
+        let Error::Unresolved { value, .. } = error else {
+            panic!("{error}");
+        };
+        // (1 − 2)/4, but for rounding.
+        assert!((value + 0.25).abs() < 1e-3, "{value}");
+    }
 }

@@ -130,3 +130,48 @@ pub(super) fn nested(vertices: &[Vec3], faces: &[[usize; 3]], pieces: &[Componen
         .map(|inner| pieces[inner].faces[0])
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TriMesh;
+    use crate::geometry::tests::{ball, cuboid, turned};
+    use crate::geometry::topology;
+
+    /// Two meshes as one list of faces.
+    fn both(a: &TriMesh, b: &TriMesh) -> (Vec<Vec3>, Vec<[usize; 3]>) {
+        let first = a.vertices().len();
+        let faces = b.faces().iter().map(|f| f.map(|v| v + first));
+        (
+            [a.vertices(), b.vertices()].concat(),
+            a.faces().iter().copied().chain(faces).collect(),
+        )
+    }
+
+    #[test]
+    fn the_pairs_are_those_of_all_one_by_one() {
+        let beside = |x: [f64; 3]| cuboid([1.0; 3]).transformed(&turned([0.0; 3], x));
+        let thrown = |mesh: TriMesh| mesh.transformed(&turned([0.3, 0.5, -0.2], [0.7, 0.1, 0.2]));
+        // In general positions, and with planes and edges on one another; the last ones touch.
+        for (a, b, crosses) in [
+            (ball(), thrown(ball()), true),
+            (cuboid([1.0; 3]), thrown(cuboid([1.0, 0.7, 0.4])), true),
+            (ball(), cuboid([1.5, 1.5, 0.3]), true),
+            (cuboid([1.0; 3]), beside([0.25, 0.5, 0.0]), true),
+            (cuboid([1.0; 3]), beside([0.5, 0.5, 0.5]), true),
+            (cuboid([1.0; 3]), beside([1.0, 1.0, 0.25]), false),
+        ] {
+            let (vertices, faces) = both(&a, &b);
+            let edges = topology::edges(faces.iter().copied().enumerate());
+            let found = crossings(&vertices, &faces, &edges);
+            assert_eq!(found.searched, faces.len());
+            let [low, high] = bounds(vertices.iter());
+            let size = (high - low).norm();
+            let exact = Exact::new(&vertices, &faces, across(&faces, &edges), size);
+            let all = (0..faces.len()).flat_map(|f| (f + 1..faces.len()).map(move |g| [f, g]));
+            let one_by_one: Vec<[usize; 2]> = all.filter(|[f, g]| exact.cross(*f, *g)).collect();
+            assert_eq!(found.pairs, one_by_one);
+            assert_eq!(!one_by_one.is_empty(), crosses);
+        }
+    }
+}

@@ -67,6 +67,15 @@ impl Field {
         }
     }
 
+    /// The distance seen from the other side of the surface.
+    pub fn negated(&self) -> Self {
+        Self {
+            distance: -self.distance,
+            gradient: -self.gradient,
+            hessian: -self.hessian,
+        }
+    }
+
     /// The same in a frame that `rotation` leads to.
     pub fn rotated(&self, rotation: &Mat3) -> Self {
         Self {

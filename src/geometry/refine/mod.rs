@@ -117,9 +117,11 @@ struct Work<'a> {
 impl Work<'_> {
     /// Whether a face is still too long for a region that it touches.
     fn too_long(&self, f: usize, longest: &EdgeLength, region: &Refinement) -> bool {
-        if longest.squared() <= region.edge * region.edge {
-            return false;
-        }
+        longest.squared() > region.edge * region.edge && self.touches(f, longest, region)
+    }
+
+    /// Whether a face touches a region.
+    fn touches(&self, f: usize, longest: &EdgeLength, region: &Refinement) -> bool {
         let corners = self.bisection.corners(f);
         let center = Vec3::from(region.center);
         // All of a face lies within its longest edge of any of its corners.
@@ -187,19 +189,32 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// What the smallest of the edges asks for.
+    /// How many faces are asked for, and the region that most of them are for.
     fn too_many(&self, regions: &[Refinement]) -> Error {
-        let faces = |f: usize| {
+        let mut about = 0.0;
+        let mut asked = vec![0.0; regions.len()];
+        for f in self.all() {
             let longest = self.bisection.longest(f);
             let area = area_vector(&self.bisection.corners(f)).norm();
-            let too_long = regions.iter().filter(|r| self.too_long(f, &longest, r));
-            let asked = too_long.map(|r| area / (MEAN_AREA * r.edge * r.edge));
-            asked.fold(1.0, f64::max)
-        };
-        let about: f64 = self.all().map(faces).sum();
-        let edges = regions.iter().map(|r| r.edge).enumerate();
-        let smallest = edges.min_by(|a, b| a.1.total_cmp(&b.1));
-        let (i, edge) = smallest.unwrap_or_default();
+            let touched = regions.iter().enumerate();
+            let touched = touched.filter(|(_, r)| self.touches(f, &longest, r));
+            // A face is split for the shortest edge that is asked of it.
+            let finest = touched.min_by(|a, b| a.1.edge.total_cmp(&b.1.edge));
+            about += match finest {
+                None => 1.0,
+                Some((i, region)) => {
+                    let faces = area / (MEAN_AREA * region.edge * region.edge);
+                    asked[i] += faces;
+                    match self.too_long(f, &longest, region) {
+                        true => faces.max(1.0),
+                        false => 1.0,
+                    }
+                }
+            };
+        }
+        let most = asked.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+        let i = most.map_or(0, |(i, _)| i);
+        let edge = regions[i].edge;
         Error::input(
             format!("{}: refine[{i}].edge", self.place),
             edge,

@@ -59,7 +59,7 @@ pub fn read(path: &Path, scale: f64) -> Result<TriMesh> {
 
 /// Reads whatever mesh a file holds; `scale` is the factor from file units to m. Polygons are
 /// split into triangles. Vertices at the same place are merged where a surface needs it to be
-/// closed (in STL always), with the numbers in [`FileMesh::repairs`].
+/// closed (in STL and DAE always), with the numbers in [`FileMesh::repairs`].
 ///
 /// # Errors
 /// [`Error::File`] if the file can't be read, [`Error::Parse`] if it is empty, truncated, of

@@ -12,7 +12,8 @@ use std::path::Path;
 pub(super) fn parse(bytes: &[u8]) -> Parsed {
     // Comments and names may be in any encoding.
     let text = String::from_utf8_lossy(bytes);
-    let lines = statements(&text);
+    // A mark of the encoding would belong to the first word.
+    let lines = statements(text.trim_start_matches('\u{feff}'));
     // The loader passes over faces with fewer than three corners, as points and lines.
     for (number, line) in &lines {
         let mut words = line.split_whitespace();
@@ -27,12 +28,18 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let Some(model) = model else {
         return Ok(Raw::default());
     };
-    let vertices = model.positions.chunks_exact(3);
+    let numbers = numbers(&lines)
+        .filter(|numbers| 3 * numbers.len() == model.positions.len())
+        .ok_or("the faces can't be understood; export it again")?;
     let mut raw = Raw {
-        vertices: vertices.map(Vec3::from_column_slice).collect(),
+        vertices: vec![Vec3::zeros(); numbers.len()],
         ..Raw::default()
     };
-    let corners: Vec<usize> = model.indices.iter().map(|&i| i as usize).collect();
+    for (x, &n) in model.positions.chunks_exact(3).zip(&numbers) {
+        raw.vertices[n] = Vec3::from_column_slice(x);
+    }
+    let corners = model.indices.iter().map(|&i| numbers[i as usize]);
+    let corners: Vec<usize> = corners.collect();
     // No arities: all faces are triangles.
     let mut arities = model.face_arities;
     if arities.is_empty() {
@@ -71,6 +78,37 @@ fn statements(text: &str) -> Vec<(usize, String)> {
         }
     }
     all
+}
+
+/// The loader numbers vertices as faces first name them, and leaves out the others. For each of them its number in the file's order, from 0 and without those left out;
+/// of statements that the loader has understood.
+fn numbers(lines: &[(usize, String)]) -> Option<Vec<usize>> {
+    let is_vertex = |line: &str| line.split_whitespace().next() == Some("v");
+    let count = lines.iter().filter(|(_, line)| is_vertex(line)).count();
+    // By the file's numbers those of the loader.
+    let mut met: Vec<Option<usize>> = vec![None; count];
+    let (mut above, mut distinct) = (0, 0);
+    for (_, line) in lines {
+        if is_vertex(line) {
+            above += 1;
+            continue;
+        }
+        for word in line.split_whitespace().skip(1) {
+            let given: isize = word.split('/').next()?.parse().ok()?;
+            // Negative numbers count back from the face.
+            let at = if given < 0 { above + given } else { given - 1 };
+            let place = met.get_mut(usize::try_from(at).ok()?)?;
+            if place.is_none() {
+                *place = Some(distinct);
+                distinct += 1;
+            }
+        }
+    }
+    let mut numbers = vec![0; distinct];
+    for (n, &loaders) in met.iter().flatten().enumerate() {
+        numbers[loaders] = n;
+    }
+    Some(numbers)
 }
 
 fn load<'a>(

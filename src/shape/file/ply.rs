@@ -65,6 +65,8 @@ fn list(value: Property) -> Option<Vec<i64>> {
 
 /// Reads vertices and faces.
 pub(super) fn parse(bytes: &[u8]) -> Parsed {
+    // A mark of the encoding, which text may begin with.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut reader = Reader::new(bytes);
     let parser = Parser::<Element>::new();
     let header = parser

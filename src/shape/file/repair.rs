@@ -8,8 +8,9 @@ use crate::geometry::{bounds, topology, weld};
 const TOLERANCE: f64 = 1e-6;
 
 /// Merges vertices where that closes the surface: first those with the same coordinates (`always`:
-/// for formats that have no other way to share vertices), then those nearby. A merge that leaves
-/// holes is taken back, so that a report speaks of the file as it is.
+/// for formats that have no other way to share vertices), then those nearby. The first is kept where fewer
+/// holes are left, the second where none is: a report speaks of the holes, not of the seams between faces that have
+/// vertices of their own.
 pub(super) fn mend(raw: Raw, always: bool) -> Raw {
     // Whatever else is wrong with indices is for the check to say.
     if raw.faces.iter().flatten().any(|&v| v >= raw.vertices.len()) {
@@ -20,25 +21,38 @@ pub(super) fn mend(raw: Raw, always: bool) -> Raw {
         return raw;
     }
     let (mut same, merged, collapsed) = merge(&raw, 0.0);
-    let left = open_edges(&same.faces);
-    if !always && left >= holes {
-        return raw;
-    }
     same.repairs.merged_same = merged;
     same.repairs.collapsed = collapsed;
+    let left = open_edges(&same.faces);
     if left == 0 {
         return same;
     }
-    let [low, high] = bounds(same.vertices.iter());
+    if let Some(near) = merged_near(&same) {
+        return near;
+    }
+    match always || left < holes {
+        true => same,
+        false => raw,
+    }
+}
+
+/// The mesh with nearby vertices merged, if that closes it.
+fn merged_near(raw: &Raw) -> Option<Raw> {
+    // Loose vertices have no effect, wherever they are.
+    let used = raw.faces.iter().flatten().map(|&v| &raw.vertices[v]);
+    let [low, high] = bounds(used);
     let largest = low.amax().max(high.amax());
     let tolerance = (TOLERANCE * (high - low).norm()).max(4.0 * f64::from(f32::EPSILON) * largest);
-    let (mut near, merged, collapsed) = merge(&same, tolerance);
-    if open_edges(&near.faces) > 0 {
-        return same;
+    if !tolerance.is_finite() {
+        return None;
+    }
+    let (mut near, merged, collapsed) = merge(raw, tolerance);
+    if near.faces.is_empty() || open_edges(&near.faces) > 0 {
+        return None;
     }
     near.repairs.merged_near = merged;
     near.repairs.collapsed += collapsed;
-    near
+    Some(near)
 }
 
 fn is_proper([a, b, c]: &[usize; 3]) -> bool {

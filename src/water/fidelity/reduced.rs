@@ -219,7 +219,9 @@ const SHORT: f64 = 2.0;
 fn warnings(problem: &Problem, made: &[Arc<ReducedBody>]) -> Vec<String> {
     let (bodies, mut out) = (problem.bodies, Vec::new());
     for (b, (body, made)) in bodies.iter().zip(made).enumerate() {
-        if bodies[..b].iter().any(|a| a.equal(body)) {
+        // Of equal bodies that are compressed alike one is enough.
+        let same = |a: usize| problem.chosen(a) == problem.chosen(b) && bodies[a].equal(body);
+        if (0..b).any(same) {
             continue;
         }
         let parts = made.parts();

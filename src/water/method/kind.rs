@@ -19,9 +19,10 @@ use std::path::Path;
 /// the gap is 7 % too small between 0.3 and 0.8 edges (320), 3 % between 0.2 and 0.7 (1280).
 const RESOLVED: f64 = 0.5;
 
-/// A distance at which nothing is near: for a body whose flow isn't asked for, m.
+/// A distance at which nothing is near: for a body whose flow isn't asked for, m. A needle has little area, and is long.
 pub(in crate::water) fn far(body: &SubmergedBody) -> f64 {
-    body.mesh.map_or(1.0, |m| m.surface_area().sqrt())
+    body.mesh
+        .map_or(1.0, |m| m.surface_area().sqrt().max(m.diameter()))
 }
 
 /// A body alone, solved.

@@ -5,9 +5,9 @@ mod references;
 mod scattering;
 
 use crate::support::bodies::off_ellipsoid;
-use hydrograd::Error;
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::boundary::{ExactBoundary, Response};
+use hydrograd::{Body, Error, Fidelity, Fluid, Scene, Settings, Shape, Simulator};
 use std::f64::consts::PI;
 
 /// Points on the ellipsoid, m, with ∫ f dA ≈ Σ weight · f: Gauss–Legendre in height, even in turn.
@@ -185,6 +185,24 @@ fn extremes_give_numbers() {
             ] {
                 assert!(field.is_all_finite(), "{axes:?} {gap}");
             }
+        }
+    }
+}
+
+/// A needle has so little area that its root is a small part of its length: nothing is asked of the flow near it, and it has its formula.
+#[test]
+fn a_needle_alone_has_its_formula() {
+    for semi_axes in [[1.0, 3e-5, 3e-5], [2e-5, 4e-5, 1.0]] {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.add(Body::new(Shape::ellipsoid(semi_axes)).density(1200.0));
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let found = simulator.added_mass().unwrap().own(0);
+        let exact = hydrograd::boundary::exact::lamb::added_mass(semi_axes).unwrap();
+        let exact = exact * scene.fluid.density;
+        for i in 0..6 {
+            let off = (found[(i, i)] - exact[(i, i)]).abs();
+            assert!(off <= 1e-12 * exact[(i, i)], "{semi_axes:?} {i}: {off:e}");
         }
     }
 }

@@ -1,40 +1,22 @@
-//! COLLADA (.dae): the triangles of all geometries that the scene shows, where its nodes place them.
+//! COLLADA (.dae): the polygons of all geometries that the scene shows, where its nodes place them.
 //!
-//! `mesh-loader` reads the geometries. The nodes are read here: it multiplies their matrices in the wrong order and places a geometry once only
-//! (version 0.1.13), so it is given the file without them. Materials, images and cameras are passed over; so is `up_axis`, as robots' tools do: axes are those of the
+//! Materials, images and cameras are passed over; so is `up_axis`, as robots' tools do: axes are those of the
 //! numbers in the file.
 
+mod geometry;
+
 use super::{Parsed, Raw};
-use hydrograd_adjoint::lie::Vec3;
-use mesh_loader::{Loader, Mesh};
+use geometry::{Geometry, child, named};
 use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// Deepest nesting of nodes, and most geometries that they may place.
 const DEEPEST: usize = 64;
 const MOST_PLACED: usize = 10_000;
-/// Most faces of all together.
+/// Most faces, and most vertices, of all together.
 const MOST_FACES: usize = 20_000_000;
-
-/// Attributes that say how much there is.
-const COUNTS: [&str; 4] = ["count", "stride", "offset", "set"];
-
-/// What isn't read and may be left out of what the crate is given.
-const LEFT_OUT: [&str; 12] = [
-    "library_visual_scenes",
-    "library_nodes",
-    "library_images",
-    "library_effects",
-    "library_materials",
-    "library_cameras",
-    "library_lights",
-    "library_animations",
-    "library_controllers",
-    "library_physics_scenes",
-    "scene",
-    "extra",
-];
 
 /// Reads all that the scene shows, in m; all geometries as they stand if there is no scene.
 pub(super) fn parse(bytes: &[u8]) -> Parsed {
@@ -45,7 +27,12 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let text = text.trim_start_matches('\u{feff}');
     let document = Document::parse(text).map_err(|e| format!("{e}; export it again"))?;
     let root = document.root_element();
-    let meshes = meshes(text, &root)?;
+    if root.tag_name().name() != "COLLADA" {
+        return Err(format!(
+            "its root is <{}>, not <COLLADA>; export it again",
+            root.tag_name().name()
+        ));
+    }
     let unit = child(&root, "asset").and_then(|asset| child(&asset, "unit"));
     let unit = unit.and_then(|unit| unit.attribute("meter")?.trim().parse::<f64>().ok());
     let unit = unit.unwrap_or(1.0);
@@ -56,68 +43,34 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let mut placed = Vec::new();
     match scene(&root) {
         Some(scene) => place(&root, &scene, whole, &mut placed)?,
-        None => placed.extend(meshes.keys().map(|id| (id.clone(), whole))),
-    }
-    // The same in every run.
-    if scene(&root).is_none() {
-        placed.sort_by(|a, b| a.0.cmp(&b.0));
+        None => placed.extend(all(&root).into_iter().map(|id| (id, whole))),
     }
     let mut raw = Raw::default();
+    let mut met: HashMap<&str, Geometry> = HashMap::new();
     for (id, at) in &placed {
-        let Some(mesh) = meshes.get(id) else {
-            return Err(format!(
-                "a node shows geometry {id:?}, which isn't there; export it again"
-            ));
+        let geometry = match met.entry(id) {
+            Entry::Occupied(met) => met.into_mut(),
+            Entry::Vacant(new) => {
+                let read = named(&root, "geometry", &format!("#{id}"))
+                    .ok_or_else(|| "it isn't there; export it again".to_string())
+                    .and_then(|element| geometry::read(&root, &element));
+                new.insert(read.map_err(|e| format!("geometry {id:?}: {e}"))?)
+            }
         };
-        add(mesh, at, &mut raw)?;
+        add(geometry, at, &mut raw).map_err(|e| format!("geometry {id:?}: {e}"))?;
     }
     Ok(raw)
 }
 
-/// The geometries by their names, as the crate reads them.
-fn meshes(text: &str, root: &Node) -> Result<HashMap<String, Mesh>, String> {
-    let mut rest = String::with_capacity(text.len());
-    let mut at = 0;
-    for part in root.children().filter(Node::is_element) {
-        if LEFT_OUT.contains(&part.tag_name().name()) {
-            let range = part.range();
-            rest.push_str(&text[at..range.start]);
-            at = range.end;
-        }
-    }
-    rest.push_str(&text[at..]);
-    // The crate makes room for what these say before it looks at what is there.
-    for node in root.descendants().filter(Node::is_element) {
-        for name in COUNTS {
-            let Some(given) = node.attribute(name) else {
-                continue;
-            };
-            let fits = |n: u64| n <= text.len() as u64;
-            if given.trim().parse().is_ok_and(|n: u64| !fits(n)) {
-                return Err(format!(
-                    "<{}> has {name}=\"{given}\" in a file of {} bytes; export it again",
-                    node.tag_name().name(),
-                    text.len()
-                ));
-            }
-        }
-    }
-    let read = Loader::default().load_collada_from_slice(rest.as_bytes(), "mesh.dae");
-    let read = read.map_err(|e| format!("{e}; export it again"))?;
-    let meshes = read.meshes.into_iter();
-    Ok(meshes.map(|mesh| (mesh.name.clone(), mesh)).collect())
-}
-
-fn child<'a, 'd>(node: &Node<'a, 'd>, name: &str) -> Option<Node<'a, 'd>> {
-    node.children()
-        .find(|c| c.is_element() && c.tag_name().name() == name)
-}
-
-/// The element with this id that a link `#id` names.
-fn named<'a, 'd>(root: &Node<'a, 'd>, kind: &str, link: &str) -> Option<Node<'a, 'd>> {
-    let id = link.strip_prefix('#')?;
-    let mut all = root.descendants();
-    all.find(|n| n.is_element() && n.tag_name().name() == kind && n.attribute("id") == Some(id))
+/// The names of all geometries that are meshes.
+fn all(root: &Node) -> Vec<String> {
+    let meshes = root.descendants().filter(|n| {
+        n.is_element() && n.tag_name().name() == "geometry" && child(n, "mesh").is_some()
+    });
+    meshes
+        .filter_map(|n| n.attribute("id"))
+        .map(String::from)
+        .collect()
 }
 
 /// What the file shows.
@@ -161,6 +114,12 @@ fn place(
                 "instance_geometry" => {
                     let id = link("geometry")?.attribute("id").unwrap_or_default();
                     placed.push((id.to_string(), at));
+                }
+                "instance_controller" => {
+                    return Err(
+                        "a node with <instance_controller>, a shape that a skeleton or a morph deforms, which isn't read; export the shape itself, without its modifiers"
+                            .into(),
+                    );
                 }
                 "lookat" | "skew" => {
                     return Err(format!(
@@ -207,20 +166,26 @@ fn matrix(name: &str, element: &Node) -> Result<Matrix4<f64>, String> {
     })
 }
 
-fn add(mesh: &Mesh, at: &Matrix4<f64>, raw: &mut Raw) -> Result<(), String> {
-    if raw.faces.len() + mesh.faces.len() > MOST_FACES {
-        return Err(format!("more than {MOST_FACES} faces; export fewer"));
+/// Adds a geometry where it is placed.
+fn add(geometry: &Geometry, at: &Matrix4<f64>, raw: &mut Raw) -> Result<(), String> {
+    let faces = raw.faces.len() + geometry.triangles();
+    if faces.max(raw.vertices.len() + geometry.vertices.len()) > MOST_FACES {
+        return Err(format!(
+            "more than {MOST_FACES} faces or vertices; export fewer"
+        ));
     }
     let first = raw.vertices.len();
-    let vertices = mesh.vertices.iter().map(|x| -> Vec3 {
-        let x = Point3::from(x.map(f64::from));
-        at.transform_point(&x).coords
-    });
+    let vertices = geometry.vertices.iter();
+    let vertices = vertices.map(|x| at.transform_point(&Point3::from(*x)).coords);
     raw.vertices.extend(vertices);
     let mirrored = at.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
-    raw.faces.extend(mesh.faces.iter().map(|face| {
-        let [a, b, c] = face.map(|v| first + v as usize);
-        if mirrored { [a, c, b] } else { [a, b, c] }
-    }));
+    for polygon in geometry.polygons() {
+        let mut corners: Vec<usize> = polygon.iter().map(|v| first + v).collect();
+        if mirrored {
+            corners[1..].reverse();
+        }
+        raw.add_face(&corners)
+            .map_err(|e| format!("a polygon with {e}"))?;
+    }
     Ok(())
 }

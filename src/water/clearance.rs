@@ -44,6 +44,8 @@ pub(crate) struct Clearance {
     contact: bool,
     /// Volumes of the bodies, m³.
     volumes: Vec<f64>,
+    /// Areas of their surfaces, m².
+    areas: Vec<f64>,
     /// Whether the flow is made by sources inside the bodies, which no flat gap is resolved by.
     pub by_sources: bool,
     /// Whether the flow has a solution where bodies touch.
@@ -99,6 +101,10 @@ impl Clearance {
             volumes: surfaces
                 .iter()
                 .map(|s| s.as_ref().map_or(0.0, |s| s.properties.volume))
+                .collect(),
+            areas: surfaces
+                .iter()
+                .map(|s| s.as_ref().map_or(0.0, |s| s.mesh.surface_area()))
                 .collect(),
             by_sources: false,
             may_touch: true,
@@ -289,6 +295,15 @@ impl Clearance {
     pub fn size(&self, gap: &Gap) -> f64 {
         let volumes = gap.sides().map(|(b, _)| self.volumes[b]);
         (0.75 / PI * volumes.fold(f64::INFINITY, f64::min)).cbrt()
+    }
+
+    /// Radius of the ball with as large a surface as the larger one of the bodies at a gap, m; of none at a wall, which is resolved however small the body.
+    pub fn expanse(&self, gap: &Gap) -> f64 {
+        let Other::Body(second) = gap.second else {
+            return 0.0;
+        };
+        let area = self.areas[gap.first].max(self.areas[second]);
+        (area / (4.0 * PI)).sqrt()
     }
 
     /// That the force across the smallest gap at the start isn't as accurate as the added mass is aimed to be.

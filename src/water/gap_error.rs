@@ -7,6 +7,7 @@
 //! q = h/r (2h/r to a wall), times (0.003/tolerance)^0.6       sources: the part of the force that they lose, or add between flat faces
 //! s = e²/(8 R h)                                              films (of their own faces) and panels: how far the faces lie inside the surfaces, in the gap
 //! R over the radius of the ball of equal volume               round, or flat
+//! x = max(e, r)/(h + s)                                       a body of size s beside one much larger, whose faces or sources are coarse for it
 //! ```
 //!
 //! The constants are fitted to `cargo bench --bench gap` (docs/accuracy-coupled.md), whose truths they are not to fall under by more than a factor of three.
@@ -68,6 +69,8 @@ pub(crate) struct Across {
     pub tolerance: f64,
     /// The gap from which on there is a film, m.
     pub reach: Option<f64>,
+    /// What the larger body resolves, by faces or sources, over how far the middle of the smaller one is; 0 where they are of like sizes.
+    pub coarse: f64,
 }
 
 /// Curvature of relative radius, in sizes: up to the first surfaces are round, from the second on flat.
@@ -101,6 +104,17 @@ const THIN: f64 = 0.08;
 /// Parts of the force's error in that of the added mass: of round surfaces, and what flat ones add to it in a film.
 const MASS: f64 = 0.1;
 const MASS_FLAT: f64 = 0.5;
+
+/// Sizes of the larger body, in those of the smaller one, between which what the larger one resolves begins to tell beside the gap.
+pub(crate) const LARGER: [f64; 2] = [2.5, 4.5];
+/// Of the force on a small body beside a large coarse one, by the square of how coarse it is, and the most of it.
+const COARSE: f64 = 0.7;
+const COARSE_MOST: f64 = 1.0;
+/// The same through a film, by the first power, until it has closed: bodies are held apart no farther than gaps of their own size ask for.
+const COARSE_FILM: f64 = 0.8;
+/// Of its added mass then, which such films don't make up for, and the most of it.
+const COARSE_MASS: f64 = 0.08;
+const COARSE_MASS_MOST: f64 = 0.25;
 
 impl Across {
     /// 0 between round surfaces, 1 between flat ones.
@@ -152,21 +166,36 @@ impl Across {
         };
         let left = (self.gap / reach).powi(3);
         let mix = |film: f64, without: f64| film + left * (without - film);
+        let coarse = COARSE_FILM * self.coarse.min(1.0) * self.gap / reach;
         GapError {
             carried: Carried::Film,
             added_mass: mix(film.added_mass, without.added_mass),
-            force: mix(film.force, without.force),
+            force: mix(film.force + coarse, without.force),
         }
+    }
+
+    /// With what a small body loses beside one whose faces or sources are coarse for it.
+    fn beside_coarse(&self, mut error: GapError) -> GapError {
+        if error.carried == Carried::Film {
+            error.added_mass += (COARSE_MASS * self.coarse).min(COARSE_MASS_MOST);
+            return error;
+        }
+        let force = (COARSE * self.coarse.powi(2)).min(COARSE_MOST);
+        error.force = (error.force + force).min(MOST);
+        error.added_mass += MASS * force;
+        error
     }
 
     /// By what compressed bodies have there.
     pub fn compressed(&self) -> GapError {
-        self.taken_over(self.by_sources(), self.by_film(FILM))
+        let film = self.beside_coarse(self.by_film(FILM));
+        self.taken_over(self.beside_coarse(self.by_sources()), film)
     }
 
     /// By what coupled panels have there.
     pub fn coupled(&self) -> GapError {
-        self.taken_over(self.by_panels(), self.by_film(FILM_OF_PANELS))
+        let film = self.beside_coarse(self.by_film(FILM_OF_PANELS));
+        self.taken_over(self.beside_coarse(self.by_panels()), film)
     }
 
     /// By panels.

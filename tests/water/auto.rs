@@ -133,3 +133,31 @@ fn a_disc_flat_over_a_wall_keeps_its_film() {
         );
     }
 }
+
+/// A pebble beside a large body is far from its middle, and near: what the block's motion does to it is there, as `reduced`, where no pair fades, has it, in every
+/// unit of length.
+#[test]
+fn small_bodies_at_large_ones_are_coupled() {
+    for scale in [1.0, 1e-3, 1e3] {
+        // Over the middle of a block's face, and over a slab beside one of its corners.
+        for (block, pebble, place) in [
+            ([2.0, 2.0, 2.0], 0.005, [0.0, 0.0, 1.01]),
+            ([2.0, 2.0, 0.2], 0.01, [0.8, 0.7, 0.115]),
+        ] {
+            let mut scene = Scene::new(Fluid::fresh_water());
+            let block = Shape::cuboid(block.map(|x| scale * x)).faces(300);
+            scene.add(Body::new(block).density(2000.0));
+            let ball = Body::new(Shape::sphere(scale * pebble)).density(1000.0);
+            scene.add(ball.at(place.map(|x| scale * x)));
+            let [all, planned] = [Fidelity::Reduced, Fidelity::Auto].map(|fidelity| {
+                let settings = Settings::default().fidelity(fidelity);
+                let simulator = Simulator::new(&scene, settings).unwrap();
+                simulator.added_mass().unwrap().matrix[(2, 8)]
+            });
+            assert!(
+                all != 0.0 && (planned / all - 1.0).abs() < 0.05,
+                "{scale} {place:?}: {planned:e} for {all:e}"
+            );
+        }
+    }
+}

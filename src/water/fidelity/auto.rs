@@ -3,7 +3,8 @@
 //! Two bodies a distance c apart feel each other as dipoles: relative to their own added mass the
 //! coupling is at most `2 D₁ D₂ / 4πc³` with `D = (V + M)/√M` per unit velocity, V the displaced
 //! volume and M the own added mass at unit density (3(a/c)³ for equal spheres of radius a); where another own one Â is given, `D = (V + M)/√Â`. A pair whose
-//! coupling is below the aim fades out. What a body must resolve follows from the smallest gap that it
+//! coupling is below the aim fades out. Dipoles are what bodies look like from afar: c is counted from the surfaces, of the balls around the bodies, for a pebble in
+//! contact with the corner of a slab is far from its middle. What a body must resolve follows from the smallest gap that it
 //! starts with.
 
 use super::given::LEAST;
@@ -26,7 +27,7 @@ const COMPRESSION: f64 = 0.5;
 const SHARE: f64 = 1.0 / 3.0;
 /// What the coupling of real bodies may be above that of their equivalent ellipsoids' dipoles.
 const SAFETY: f64 = 1.5;
-/// Where a pair begins to fade, of the distance where it is gone.
+/// Where a pair begins to fade, of the distance between surfaces where it is gone.
 const NEAR: f64 = 0.8;
 /// What is resolved, of the smallest gap at the start: bodies may come nearer.
 const ROOM: f64 = 0.6;
@@ -117,10 +118,12 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
             });
         };
         let properties = mesh.mass_properties();
-        strengths.push((
-            strength(&properties, body.added_mass.as_ref())?,
-            poses[b].apply(&mesh.bounding_ball().center),
-        ));
+        let ball = mesh.bounding_ball();
+        strengths.push(Seen {
+            strength: strength(&properties, body.added_mass.as_ref())?,
+            centre: poses[b].apply(&ball.center),
+            radius: ball.radius,
+        });
         let distances = near[b].iter().map(|start| start.gap.image_distance());
         let smallest = distances.fold(f64::INFINITY, f64::min);
         let (finest, coarsest) = (compress::finest_gap(mesh.surface_area()), coarsest[b]);
@@ -155,24 +158,42 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
             if a == b && walls.is_empty() {
                 continue;
             }
-            let far =
-                (SAFETY * 2.0 * strengths[a].0 * strengths[b].0 / (4.0 * PI * SHARE * aim)).cbrt();
-            let cutoff = Cutoff {
-                near: NEAR * far,
-                far,
-            };
+            let (first, second) = (&strengths[a], &strengths[b]);
+            let cutoff = first.cutoff(second, aim);
             out.plan.cutoffs.push(((a, b), cutoff));
-            let c = (strengths[a].1 - strengths[b].1).norm();
+            let c = (first.centre - second.centre).norm();
             if a != b && c > cutoff.near {
                 out.reasons.push(format!(
-                    "bodies {:?} and {:?} start {c:.3e} m apart: coupled in full up to {:.3e} m, not \
-                     at all from {far:.3e} m on",
-                    other.name, body.name, cutoff.near
+                    "bodies {:?} and {:?} start with their middles {c:.3e} m apart: coupled in full up to {:.3e} m, \
+                     not at all from {:.3e} m on",
+                    other.name, body.name, cutoff.near, cutoff.far
                 ));
             }
         }
     }
     Ok(out)
+}
+
+/// A body as others see it from afar.
+struct Seen {
+    /// D, m^3/2.
+    strength: f64,
+    /// Middle of the ball around it in the world, and its radius, m.
+    centre: Vec3,
+    radius: f64,
+}
+
+impl Seen {
+    /// Where two bodies, or a body and its image, fade out for each other at an accuracy: distances of their middles.
+    fn cutoff(&self, other: &Self, aim: f64) -> Cutoff {
+        let dipoles = SAFETY * 2.0 * self.strength * other.strength;
+        let far = (dipoles / (4.0 * PI * SHARE * aim)).cbrt();
+        let touch = self.radius + other.radius;
+        Cutoff {
+            near: touch + NEAR * far,
+            far: touch + far,
+        }
+    }
 }
 
 /// The gap that a body resolves to which nothing is near, m.

@@ -30,27 +30,29 @@ use std::sync::Arc;
 use std::time::Instant;
 
 impl Simulator {
-    fn matrix(
+    /// The controls that are given, or none for so many steps.
+    fn controls(
         &self,
         place: &str,
         given: Option<&Bound<'_, PyAny>>,
         steps: Option<usize>,
-    ) -> PyResult<DMatrix<f64>> {
+    ) -> PyResult<Controls> {
         let n = self.controls_size();
         let Some(given) = given else {
-            return Ok(DMatrix::zeros(n, steps.unwrap_or(self.scene.steps)));
+            return Controls::none(&self.inner, steps.unwrap_or(self.scene.steps)).or_raise();
         };
-        let found = array(place, given, &[Dim::Any("steps"), Dim::Is(n)])?;
+        let shape = [Dim::Any("steps"), Dim::Is(n)];
+        let found = array(&format!("{place}: controls"), given, &shape)?;
         if let Some(steps) = steps
             && steps != found.shape[0]
         {
             return Err(input(
-                "rollout: steps",
+                format!("{place}: steps"),
                 steps,
                 format!("must be {}, as the controls say", found.shape[0]),
             ));
         }
-        Ok(found.columns(n))
+        Controls::from_matrix(&self.inner, found.columns(n)).or_raise()
     }
 
     /// The state where a run begins.
@@ -216,13 +218,12 @@ impl Simulator {
     ) -> PyResult<Rollout> {
         let me = slf.get();
         let start = me.begin(state, q, v)?;
-        let matrix = me.matrix("rollout: controls", controls, steps)?;
-        let (py, steps) = (slf.py(), matrix.ncols());
+        let controls = me.controls("rollout", controls, steps)?;
+        let (py, steps) = (slf.py(), controls.steps());
         let mut progress = Progress::new("rollout: progress", progress, steps)?;
         let inner = me.inner.clone();
         let started = Instant::now();
         let made = followed(py, &mut progress, move |interrupt| {
-            let controls = Controls::from_matrix(&inner, matrix)?;
             let state = start.state(&inner)?;
             Ok(inner.rollout_as_far(&state, &controls, |done| interrupt.at(done)))
         })?;
@@ -410,13 +411,12 @@ impl Simulator {
                 "must be a number of bytes above zero",
             ));
         }
-        let matrix = self.matrix("gradient_in_parts: controls", controls, steps)?;
+        let controls = self.controls("gradient_in_parts", controls, steps)?;
         let (inner, objective) = (self.inner.clone(), objective.0.clone());
-        let kept = Checkpoints::within(&inner, matrix.ncols(), memory);
-        let total = kept.work(matrix.ncols());
+        let kept = Checkpoints::within(&inner, controls.steps(), memory);
+        let total = kept.work(controls.steps());
         let mut progress = Progress::new("gradient_in_parts: progress", progress, total)?;
         let made = followed(py, &mut progress, move |interrupt| {
-            let controls = Controls::from_matrix(&inner, matrix)?;
             inner.gradient_in_parts(&controls, &objective, kept, |done| interrupt.at(done))
         });
         let made = ended(progress, made)?;

@@ -43,6 +43,14 @@ fn problems_that_cannot_be() {
             vec!["hold", "at least 1"],
         ),
         (
+            Problem::new(6_000_000, effort()),
+            vec!["knots · hold", "at most 5000000"],
+        ),
+        (
+            Problem::new(usize::MAX, effort()).hold(2),
+            vec!["knots · hold", "at most 5000000"],
+        ),
+        (
             Problem::new(5, effort()).limits([1.0], [-1.0]),
             vec![
                 "limits of control 0",

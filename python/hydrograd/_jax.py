@@ -43,7 +43,8 @@ class Memo(Generic[Kept]):
 
     @staticmethod
     def key(physics: Physics, arrays: Sequence[NDArray[Any]]) -> Any:
-        return (physics, *(array.tobytes() for array in arrays))
+        # Arrays of nothing differ by their shapes alone.
+        return (physics, *((array.shape, array.tobytes()) for array in arrays))
 
     def put(self, key: Any, made: Kept) -> None:
         with self._lock:

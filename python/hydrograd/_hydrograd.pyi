@@ -1398,7 +1398,7 @@ def ilqr(
 
     It makes `iterations` at most, and ends once one lowers the cost, or expects to, by less than `tolerance` of it, or the cost is at most `target`. `regularisation` is the part by which each control's
     curvature is made larger at first, `trials` the most lengths of a step that are tried. `progress(p)` is called after every iteration with an `IlqrProgress`; where it gives True the plan so far is
-    what is found. Ctrl-C ends it."""
+    what is found. What it raises ends it and comes out, and so does what a cost or a controller of your own raises. Ctrl-C ends it."""
 def minimise(
     function: Callable[[_Array], _Evaluated],
     start: ArrayLike,

@@ -257,7 +257,7 @@ fn planned<'py>(simulator: &Bound<'py, Simulator>, plan: Plan) -> PyResult<Bound
 ///
 /// It makes `iterations` at most, and ends once one lowers the cost, or expects to, by less than `tolerance` of it, or the cost is at most `target`. `regularisation` is the part by which each control's
 /// curvature is made larger at first, `trials` the most lengths of a step that are tried. `progress(p)` is called after every iteration with an `IlqrProgress`; where it gives True the plan so far is
-/// what is found. Ctrl-C ends it.
+/// what is found. What it raises ends it and comes out, and so does what a cost or a controller of your own raises. Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
     simulator, cost, *, knots, hold=1, lower=None, upper=None, previous=None, state=None, guess=None, shift=0, iterations=100, tolerance=1e-9, target=None, regularisation=0.0,

@@ -93,6 +93,19 @@ def test_custom_is_what_is_built_in(sim):
     assert without.cost <= without.costs[0]
 
 
+def test_what_a_cost_raises_ends_the_search(sim):
+    """Where the start was fine too: it isn't taken for a trial that fails."""
+
+    def own(point):
+        if point.q[0] > 0.01:
+            raise NameError("I forgot")
+        return 0.0, None, None
+
+    terms = [cost.position("hull", (0.3, 0, 0), 100.0), cost.effort(1e-6), cost.custom(own)]
+    with pytest.raises(NameError, match="I forgot"):
+        hg.optimize.ilqr(sim, terms, knots=15)
+
+
 def test_moving_targets(sim):
     times = np.linspace(0, 1, 11)
     path = np.stack([0.2 * times, 0.1 * np.sin(times), 0 * times], axis=1)

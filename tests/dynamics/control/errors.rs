@@ -318,6 +318,54 @@ fn a_gradient_that_leads_uphill_ends_stuck() {
     assert!(plan.gradient > 0.0);
 }
 
+/// A cost that draws to a place, and can't be told near it: by the user's own fault, or not.
+struct Near {
+    own: bool,
+}
+
+impl CustomCost for Near {
+    fn value(&self, at: &CostPoint) -> Result<f64> {
+        let x = at.sample().q[0];
+        match (x > 0.01, self.own) {
+            (true, true) => Err(Error::Controller {
+                source: "of my own".into(),
+            }),
+            (true, false) => Err(Error::input("my cost", x, "must be farther off")),
+            (false, _) => Ok(1e4 * (x - 0.02).powi(2)),
+        }
+    }
+
+    fn quadratic(&self, at: &CostPoint) -> Result<Quadratic> {
+        let mut out = Quadratic::zeros(16, at.control.map_or(8, |u| u.len()));
+        out.value = self.value(at)?;
+        out.x[0] = 2e4 * (at.sample().q[0] - 0.02);
+        out.xx[(0, 0)] = 2e4;
+        Ok(out)
+    }
+}
+
+#[test]
+fn what_a_cost_raises_ends_the_search_and_a_trial_that_fails_does_not() {
+    let sim = simulator();
+    let start = sim.initial().unwrap();
+    let settings = IlqrSettings {
+        iterations: 3,
+        ..IlqrSettings::default()
+    };
+    let made = |own: bool| {
+        let cost = Cost::default()
+            .running(terms::effort(1e-6))
+            .running(terms::custom(Near { own }));
+        let on = |_: &IlqrProgress| ControlFlow::Continue(());
+        let problem = Problem::new(5, cost);
+        ilqr(&sim, &start, &problem, Guess::Zero, &settings, on)
+    };
+    let plan = made(false).unwrap();
+    assert!(plan.cost() < plan.costs[0], "{:?}", plan.costs);
+    let error = made(true).err().expect("an error");
+    assert!(matches!(error, Error::Controller { .. }), "{error}");
+}
+
 #[test]
 fn costs_of_ones_own_that_cannot_be() {
     let sim = simulator();

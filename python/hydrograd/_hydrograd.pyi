@@ -652,7 +652,7 @@ class Simulator:
         held: Sequence[bool] | None = None,
     ) -> State:
         """The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
-        where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+        where the simulator starts, with joints that a motion drives where that has them then. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
         step that led here, by default none."""
     def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]:
         """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
@@ -667,8 +667,8 @@ class Simulator:
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None, *, step: int = 0
     ) -> tuple[_Array, _Array]:
         """The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
-        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
-        `step` is the number of the step, and so the time, of motions and currents."""
+        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, with joints that a motion drives where that has them
+        then, and no control. `step` is the number of the step, and so the time, of motions and currents."""
     def gradcheck(self, steps: int | None = None, *, directions: int = 4, seed: int = 0) -> dict[str, Any]:
         """Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
         initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest

@@ -424,7 +424,7 @@ impl Simulator {
     }
 
     /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
-    /// where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+    /// where the simulator starts, with joints that a motion drives where that has them then. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
     /// step that led here, by default none.
     #[pyo3(signature = (q=None, v=None, *, step=0, mode=0, held=None))]
     fn state(
@@ -446,8 +446,16 @@ impl Simulator {
             ));
         }
         let (q0, v0) = me.inner.start();
-        let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
-        let made = short(slf.py(), || me.inner.state(step, &q, &v))?;
+        let row = |place: &str, given: Option<&Bound<'_, PyAny>>, default: &DVector<f64>| {
+            given
+                .map(|given| row_or(place, Some(given), default))
+                .transpose()
+        };
+        let (q, v) = (row("state: q", q, q0)?, row("state: v", v, v0)?);
+        let (made, v) = short(slf.py(), || {
+            let (q, v) = me.inner.placed(step, q.as_ref(), v.as_ref())?;
+            Ok((me.inner.state(step, &q, &v)?, v))
+        })?;
         let state = dynamics::State { held, mode, ..made };
         Ok(State {
             simulator: slf.clone().unbind(),
@@ -509,8 +517,8 @@ impl Simulator {
     }
 
     /// The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
-    /// `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
-    /// `step` is the number of the step, and so the time, of motions and currents.
+    /// `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, with joints that a motion drives where that has them
+    /// then, and no control. `step` is the number of the step, and so the time, of motions and currents.
     #[pyo3(signature = (q=None, v=None, u=None, *, step=0))]
     fn linearise<'py>(
         &self,

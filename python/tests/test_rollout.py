@@ -2,6 +2,7 @@
 
 import pickle
 
+import bridge_scenes
 import numpy as np
 import pytest
 
@@ -224,3 +225,19 @@ def test_no_configurations_have_no_tangents(sim):
     equations = sim.equations(none)
     assert equations.q.shape == none.shape and equations.mass_matrix().shape == (0, sim.v_size, sim.v_size)
     assert sim.linearise(none)[0].shape == (0, 2 * sim.v_size, 2 * sim.v_size)
+
+
+def test_states_have_driven_joints_where_their_motion_has_them():
+    sim = bridge_scenes.locking()
+    rollout = sim.rollout(steps=3)
+    state = sim.state(step=3)
+    assert state.q[1] == pytest.approx(rollout.q[3, 1], rel=1e-12)
+    assert state.v[1] == pytest.approx(0.05 * np.cos(0.06), rel=1e-12)
+    given = sim.state(q=rollout.q[3], v=[rollout.v[3, 0], 0.0], step=3)
+    np.testing.assert_allclose(given.v, rollout.v[3], rtol=1e-12)
+    for one in (state, given):
+        np.testing.assert_allclose(one.v, sim.rollout(steps=0, state=one).v[0], rtol=1e-9)
+    for found, right in zip(sim.linearise(step=3), sim.linearise(state.q, state.v, step=3)):
+        assert np.array_equal(found, right)
+    with pytest.raises(hg.InputError, match="other.*driven"):
+        sim.state(q=sim.initial_q + [0.0, 0.01], step=3)

@@ -13,7 +13,7 @@ use crate::objective::Objective;
 use crate::policy::Controller;
 use crate::prepare::{Parts, Start, build, set_gains, warnings};
 use crate::rollout::Rollout;
-use crate::scene::Scene;
+use crate::scene::{Scene, copied};
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
@@ -164,7 +164,7 @@ impl Simulator {
     )]
     fn new(
         py: Python<'_>,
-        scene: PyRef<'_, Scene>,
+        scene: &Bound<'_, Scene>,
         dt: Option<f64>,
         fidelity: Option<&str>,
         method: Option<&str>,
@@ -195,7 +195,7 @@ impl Simulator {
             shape_parameters,
             backend,
         };
-        let scene = scene.0.clone();
+        let scene = copied(scene)?;
         let choices = keywords.settings()?.resolve(&scene);
         build(py, scene, choices, cache)
     }

@@ -216,6 +216,24 @@ def test_other_threads_run_meanwhile(sim):
     assert count > 10
 
 
+def test_a_scene_is_free_while_something_is_made_of_it():
+    """Other threads may change it."""
+    scene, done = hg.Scene(), []
+    scene.add(hg.Body(hg.sphere(1.0), name="ball", density=1000.0))
+
+    def make():
+        done.append(hg.Simulator(scene, fidelity="full", faces=2000).body_names)
+
+    thread, count = threading.Thread(target=make), 0
+    thread.start()
+    while thread.is_alive():
+        scene.set_initial()
+        count += 1
+        time.sleep(0.001)
+    thread.join()
+    assert done == [["ball"]] and count > 5
+
+
 def test_counts_that_are_none(sim):
     for name, call in (
         ("steps", lambda: sim.rollout(steps=-1)),

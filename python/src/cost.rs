@@ -13,7 +13,7 @@ use pyo3::types::PyTuple;
 ///
 /// It is the sum of `weights` times squared entries: one weight for all, or one each. A running term is integrated over time: at every knot but the last it counts its value times
 /// the knot's duration. With `last=True` it counts once, at the end. Targets stand, or move: with `times` (n,), s, of the simulation's clock, `target` has a row for each, and goes straight from row to row.
-#[pyclass(frozen, module = "hydrograd")]
+#[pyclass(frozen, module = "hydrograd.cost")]
 #[derive(Clone)]
 pub struct CostTerm {
     /// The term.

@@ -1,7 +1,6 @@
 //! What simulators do: the methods of their class.
 
 use crate::array::{self, Dim, array};
-use crate::control::Tracking;
 use crate::equations::Equations;
 use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::{self, by_name};
@@ -17,6 +16,7 @@ use crate::scene::{Scene, copied};
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
+use crate::tracking::Tracking;
 use hydrograd::simulate::{Begin, Checkpoints, Halted, Member, Policy};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};

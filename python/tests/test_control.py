@@ -1,5 +1,7 @@
 """Optimal control from Python: the numbers of the Rust side, shapes, callbacks, and errors in Python's words."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -70,6 +72,26 @@ def test_tracking_is_a_policy(sim):
     np.testing.assert_array_equal(other.q, tracked.q)
     seed = np.ones_like(tracked.positions)
     np.testing.assert_allclose(other.vjp(positions=seed).initial_v, tracked.vjp(positions=seed).initial_v, rtol=1e-12)
+
+
+def test_tracking_travels(sim):
+    """By itself, with a simulator that it controls, and with a rollout."""
+    plan = hg.optimize.ilqr(sim, TERMS, knots=20, hold=3, lower=-20, upper=[20.0] * 5 + [np.inf])
+    again = pickle.loads(pickle.dumps(plan.tracking))
+    bar = np.linspace(-1.0, 1.0, 6)
+    for time in (-0.1, 0.37, 1.19, 9.0):
+        seen = hg.Observation(0, time, plan.rollout.q[7], plan.rollout.v[7] + 0.01)
+        assert np.array_equal(again.act(seen), plan.tracking.act(seen))
+        for found, right in zip(again.act_vjp(seen, bar), plan.tracking.act_vjp(seen, bar)):
+            assert np.array_equal(found, right)
+    held = sim.with_policy(plan.tracking)
+    rollout = held.rollout(steps=20, v=[0.1, 0.0, -0.1, 0.2, 0.0, 0.3])
+    other = pickle.loads(pickle.dumps(held)).rollout(steps=20, v=rollout.v[0])
+    assert np.array_equal(other.q, rollout.q)
+    assert np.array_equal(pickle.loads(pickle.dumps(rollout)).q, rollout.q)
+    for wrong in (bar[:2], np.zeros(9)):
+        with pytest.raises(hg.InputError, match="control_bar.*must be 6 numbers"):
+            plan.tracking.act_vjp(seen, wrong)
 
 
 def test_custom_is_what_is_built_in(sim):

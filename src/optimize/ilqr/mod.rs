@@ -24,7 +24,7 @@ mod tracking;
 pub use plan::{Guess, Plan};
 pub use problem::Problem;
 pub use settings::{IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes};
-pub use tracking::Tracking;
+pub use tracking::{Track, Tracking};
 
 pub(super) use problem::Ready;
 

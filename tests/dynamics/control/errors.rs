@@ -1,12 +1,13 @@
 //! What can't be is refused, with its place and what would be right.
 
-use super::vehicle;
+use super::{solve, vehicle};
 use crate::support::says;
 use hydrograd::optimize::{
     Cost, CostPoint, CustomCost, Guess, IlqrProgress, IlqrSettings, IlqrStop, Mpc, MpcSettings,
-    Problem, Quadratic, Target, Term, ilqr, terms,
+    Problem, Quadratic, Target, Term, Track, Tracking, ilqr, terms,
 };
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
+use hydrograd::simulate::{Observation, Policy};
 use hydrograd::{Error, Fidelity, Result, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
@@ -261,6 +262,48 @@ fn states_that_cannot_be() {
     assert_eq!(mpc.replans().len(), 1);
     let next = mpc.control(sim.time_step(), q, v).unwrap();
     assert!(next.iter().all(|u| u.is_finite()));
+}
+
+#[test]
+fn feedback_of_other_sizes() {
+    let sim = simulator();
+    let problem = Problem::new(5, Cost::default().running(terms::effort(1.0)));
+    let tracking = solve(&sim, &problem, &IlqrSettings::default()).tracking();
+    let (q, v) = sim.start();
+    let seen = Observation {
+        step: 0,
+        time: 0.0,
+        q,
+        v,
+        mode: 0,
+    };
+    for count in [2, 9] {
+        let found = tracking.act_vjp(&seen, &DVector::zeros(count));
+        let given = format!("got {count} numbers");
+        let words = ["control_bar", given.as_str(), "must be 8"];
+        says(found.err().expect("an error"), &words);
+    }
+    let again = Tracking::of(tracking.track().clone()).unwrap();
+    let moved = v.map(|x| x + 0.1);
+    let controls = |of: &Tracking| of.control(2, q, &moved).unwrap();
+    assert_eq!(controls(&again), controls(&tracking));
+    let with = |change: &dyn Fn(&mut Track)| {
+        let mut track = tracking.track().clone();
+        change(&mut track);
+        Tracking::of(track).err().expect("an error")
+    };
+    let rest = "8 controls, 9 coordinates and 8 velocities";
+    for (error, what) in [
+        (with(&|t| t.hold = 2), "states"),
+        (with(&|t| t.hold = 0), "knots and hold"),
+        (with(&|t| t.gains.truncate(4)), "gains"),
+        (with(&|t| t.states[3].1 = DVector::zeros(7)), "states"),
+        (with(&|t| t.controls = DMatrix::zeros(7, 5)), "controls"),
+        (with(&|t| t.lower[1] = f64::NAN), "limits"),
+        (with(&|t| t.start = f64::NAN), "start"),
+    ] {
+        says(error, &["tracking of a plan", what, rest]);
+    }
 }
 
 struct Wrong(&'static str);

@@ -85,8 +85,8 @@ def test_tracking_travels(sim):
         for found, right in zip(again.act_vjp(seen, bar), plan.tracking.act_vjp(seen, bar)):
             assert np.array_equal(found, right)
     held = sim.with_policy(plan.tracking)
-    rollout = held.rollout(steps=20, v=[0.1, 0.0, -0.1, 0.2, 0.0, 0.3])
-    other = pickle.loads(pickle.dumps(held)).rollout(steps=20, v=rollout.v[0])
+    start = {"v": [0.1, 0.0, -0.1, 0.2, 0.0, 0.3]}
+    rollout, other = held.rollout(steps=20, **start), pickle.loads(pickle.dumps(held)).rollout(steps=20, **start)
     assert np.array_equal(other.q, rollout.q)
     assert np.array_equal(pickle.loads(pickle.dumps(rollout)).q, rollout.q)
     for wrong in (bar[:2], np.zeros(9)):

@@ -126,7 +126,7 @@ def mesh(
 ) -> Shape:
     """A closed triangle mesh: from arrays `vertices` (n, 3) and `faces` (m, 3) of vertex numbers counted from 0,
     counter-clockwise seen from outside; from anything that has them as attributes, such as a mesh of trimesh; or from
-    the path of an OBJ, STL or PLY file. `scale` is the factor from its unit to m."""
+    the path of an OBJ, STL, PLY or DAE file, which is read where it is wanted. `scale` is the factor from its unit to m."""
 
 @final
 class Joint:
@@ -336,10 +336,10 @@ class Scene:
     ) -> Scene: ...
     @staticmethod
     def load(path: _Path) -> Scene:
-        """Reads a scene file (TOML); paths of meshes are relative to it."""
+        """Reads a scene file (TOML); paths of meshes are relative to it, and absolute in the scene."""
     @staticmethod
     def from_toml(text: str, folder: _Path | None = None) -> Scene:
-        """A scene from TOML text; paths of meshes are relative to `folder`."""
+        """A scene from TOML text; paths of meshes are relative to `folder`, and absolute in the scene."""
     @staticmethod
     def from_urdf(
         path: _Path,

@@ -65,13 +65,13 @@ impl Scene {
         Ok(Self(scene))
     }
 
-    /// Reads a scene file (TOML); paths of meshes are relative to it.
+    /// Reads a scene file (TOML); paths of meshes are relative to it, and absolute in the scene.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         light(py, || hydrograd::Scene::load(path)).map(Self)
     }
 
-    /// A scene from TOML text; paths of meshes are relative to `folder`.
+    /// A scene from TOML text; paths of meshes are relative to `folder`, and absolute in the scene.
     #[staticmethod]
     #[pyo3(signature = (text, folder=None))]
     fn from_toml(py: Python<'_>, text: &str, folder: Option<PathBuf>) -> PyResult<Self> {

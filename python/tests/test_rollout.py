@@ -162,6 +162,30 @@ def test_meshes_from_arrays_objects_and_files(tmp_path):
     assert np.allclose(*matrices, rtol=1e-9, atol=1e-12)
 
 
+def test_files_of_meshes_are_found_from_anywhere(tmp_path, monkeypatch):
+    vertices, faces = hg.box(0.1, 0.2, 0.3, faces=80).triangles()
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    for folder in ("scenes", "elsewhere"):
+        (tmp_path / folder).mkdir()
+    file = tmp_path / "scenes/box.obj"
+    file.write_text("\n".join(lines))
+    body = '[[bodies]]\nname = "box"\ndensity = 1000.0\nshape = { kind = "mesh", path = "box.obj" }\n'
+    (tmp_path / "scenes/a.toml").write_text(f"time_step = 0.01\nsteps = 2\n[fluid]\ndensity = 0.0\n{body}")
+    monkeypatch.chdir(tmp_path)
+    scene, shape = hg.Scene.load("scenes/a.toml"), hg.mesh("scenes/box.obj")
+    sim = hg.Simulator(scene)
+    monkeypatch.chdir("elsewhere")
+    text = scene.to_toml()
+    for again in (pickle.loads(pickle.dumps(scene)), hg.Scene.from_toml(text), hg.Scene.from_toml(text, "nowhere")):
+        assert again == scene
+    assert pickle.loads(pickle.dumps(sim)).rollout().steps == 2
+    assert np.isclose(shape.volume, 0.006)
+    # What a simulator was made of it knows, whatever became of the file.
+    file.unlink()
+    assert len(sim.rollout().to_dict()["time"]) == 3
+
+
 def test_a_state_of_another_simulator_keeps_its_velocity(sim, controls):
     """Whatever integrators step in: most of them in momentum, which is another where the masses are."""
 

@@ -82,7 +82,16 @@ enum Start {
 
 impl Start {
     fn of(given: Option<&Bound<'_, PyAny>>, shift: usize, controls: usize) -> PyResult<Self> {
+        let unmoved = || match shift {
+            0 => Ok(()),
+            _ => Err(input(
+                "ilqr: shift",
+                shift,
+                "must be 0 unless the guess is a plan, which is so many time steps on its way",
+            )),
+        };
         let Some(given) = given else {
+            unmoved()?;
             return Ok(Self::Zero);
         };
         let tracking = match given.cast::<Tracking>() {
@@ -93,6 +102,7 @@ impl Start {
             let tracking = tracking.cast_into::<Tracking>()?;
             return Ok(Self::Plan(tracking.get().inner.clone(), shift));
         }
+        unmoved()?;
         let shape = [Dim::Any("knots"), Dim::Is(controls)];
         Ok(Self::Controls(
             array("ilqr: guess", given, &shape)?.columns(controls),

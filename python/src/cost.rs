@@ -88,9 +88,15 @@ impl CostTerm {
         times: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let weights = self::weights("effort", weights)?;
-        let term = match target {
-            None => terms::effort(weights),
-            Some(target) => terms::control(self::target("effort", target, times)?, weights),
+        let term = match (target, times) {
+            (None, None) => terms::effort(weights),
+            (None, Some(times)) => {
+                let remedy = "give a `target` with a row for each, or leave them out";
+                return Err(input("effort: times", times.repr()?, remedy));
+            }
+            (Some(target), times) => {
+                terms::control(self::target("effort", target, times)?, weights)
+            }
         };
         Ok(Self { term, last: false })
     }

@@ -174,11 +174,15 @@ def test_errors(sim):
     refused("last term", cost.position("hull", (0, 0, np.e), 1, last=True), cost.velocity([0.0], 1, last=True))
     refused("iterations", iterations=0)
     refused("previous", previous=[1.0])
+    refused("shift: got 3; must be 0 unless the guess is a plan", shift=3)
+    refused("shift: got 3; must be 0 unless the guess is a plan", shift=3, guess=np.zeros((5, 6)))
     refused("must be a tuple", cost.custom(lambda p: 1.0))
     refused(r"xx.*\(12, 12\)", cost.custom(lambda p: (1.0, None, None, np.eye(3), None, None)))
     refused("by zero", cost.custom(lambda p: 1 / 0), error=ZeroDivisionError)
     with pytest.raises(hg.InputError, match="callable"):
         cost.custom(3)
+    with pytest.raises(hg.InputError, match=r"effort: times: got \[0, 1\]; give a `target`"):
+        cost.effort(1.0, times=[0, 1])
     with pytest.raises(hg.InputError, match="every"):
         hg.optimize.Mpc(sim, TERMS, knots=5, every=9)
     mpc = hg.optimize.Mpc(sim, TERMS, knots=5)

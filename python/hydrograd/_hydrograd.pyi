@@ -317,6 +317,7 @@ def inspect_robot(
     """What a robot in a URDF file comes to in water of `density` (kg/m³): tree, masses, weight against buoyancy, meshes that were replaced, and what of the file wasn't
     used. Choices are those of `Scene.add_robot`."""
 
+@final
 class Scene:
     """What a simulation starts from: the fluid, walls, and bodies with their joints.
 
@@ -396,7 +397,7 @@ class Scene:
         self, point: ArrayLike, normal: ArrayLike, surface: Literal["rigid", "free"] = "rigid"
     ) -> None:
         """Adds a plane wall through `point` (m) with `normal` into the fluid. `surface` is "rigid", or "free" for a flat free
-        surface without waves (fidelity "reduced" only)."""
+        surface without waves (with the fidelities "reduced" and "auto", and "full" by panels)."""
     @overload
     def add_force(
         self,
@@ -1072,7 +1073,7 @@ class Rollout:
         """Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
         space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
         (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-        cotangents of others by name, each in the shape that `observe` gives; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
+        cotangents of others by name, each in the shape that `observe` gives, but of "q", "rotations" and "site_rotations" in the tangent space, as `q` and `rotations`; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
     def jvp(
         self,
         *,
@@ -1097,7 +1098,7 @@ class Rollout:
         of: Sequence[str] | None = None,
         states: Sequence[int] | None = None,
     ) -> dict[str, _Array]:
-        """Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" as δθ) at `states` (all where None; negative numbers count from the end)
+        """Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" and "site_rotations" as δθ) at `states` (all where None; negative numbers count from the end)
         with respect to the `parameters` named, and where True the initial `q` (in its tangent space) and `v`, the `gains`, and the `controls` of all steps: by name an array
         (states, …, columns) whose columns come in that order. It costs a few runs, whatever the number of columns. Ctrl-C ends it."""
     def step_jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]:

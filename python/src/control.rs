@@ -54,7 +54,9 @@ fn limits(place: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
     }
 }
 
+/// What is to be found; errors call what is given `place`'s.
 fn problem(
+    place: &str,
     cost: Vec<PyRef<'_, CostTerm>>,
     knots: usize,
     hold: usize,
@@ -62,7 +64,7 @@ fn problem(
     upper: Option<&Bound<'_, PyAny>>,
     previous: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Problem> {
-    let previous = previous.map(|given| array::row("ilqr: previous", given));
+    let previous = previous.map(|given| array::row(&format!("{place}: previous"), given));
     Ok(Problem {
         knots,
         hold,
@@ -212,7 +214,7 @@ pub fn ilqr<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let me = simulator.get();
-    let problem = problem(cost, knots, hold, lower, upper, previous)?;
+    let problem = problem("ilqr", cost, knots, hold, lower, upper, previous)?;
     let start = Start::of(guess, shift, me.controls_size())?;
     let state = state.map(|state| state.clone().unbind());
     let settings = IlqrSettings {
@@ -364,7 +366,7 @@ impl Mpc {
         tolerance: f64,
         trials: usize,
     ) -> PyResult<Self> {
-        let problem = problem(cost, knots, hold, lower, upper, previous)?;
+        let problem = problem("mpc", cost, knots, hold, lower, upper, previous)?;
         let base = MpcSettings::default();
         let settings = MpcSettings {
             every,

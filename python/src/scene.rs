@@ -139,7 +139,7 @@ impl Scene {
     }
 
     /// Adds a plane wall through `point` (m) with `normal` into the fluid. `surface` is "rigid", or "free" for a flat free
-    /// surface without waves (fidelity "reduced" only).
+    /// surface without waves (with the fidelities "reduced" and "auto", and "full" by panels).
     #[pyo3(signature = (point, normal, surface="rigid"))]
     fn add_wall(
         &mut self,

@@ -185,6 +185,9 @@ def test_errors(sim):
         cost.effort(1.0, times=[0, 1])
     with pytest.raises(hg.InputError, match="every"):
         hg.optimize.Mpc(sim, TERMS, knots=5, every=9)
+    with pytest.raises(hg.InputError, match="^mpc: previous: "):
+        hg.optimize.Mpc(sim, TERMS, knots=5, previous="x")
+    refused("^ilqr: previous: ", previous="x")
     mpc = hg.optimize.Mpc(sim, TERMS, knots=5)
     with pytest.raises(hg.InputError, match="control: q"):
         mpc.control(0.0, np.zeros(3), np.zeros(6))

@@ -2,7 +2,7 @@
 
 use crate::array::{self, Dim, array};
 use crate::cost::CostTerm;
-use crate::error::{OrRaise, input, internal};
+use crate::error::{input, internal};
 use crate::interrupt::{Interrupt, Progress, Told, followed, lock, long, short};
 use crate::optimize::class;
 use crate::rollout::Rollout;

@@ -187,6 +187,12 @@ impl Error {
         self
     }
 
+    /// Whether it ends a search, and isn't one trial's failure: what was asked to stop, and what a controller or cost of the user's own raises.
+    #[cfg(feature = "opt")]
+    pub(crate) fn ends_search(&self) -> bool {
+        matches!(self, Self::Stopped { .. } | Self::Controller { .. })
+    }
+
     /// The same, said of one of several things that are done side by side.
     #[cfg(feature = "opt")]
     pub(crate) fn within(mut self, what: &str) -> Self {

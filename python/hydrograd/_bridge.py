@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import functools
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,7 +19,6 @@ from numpy.typing import NDArray
 from hydrograd._charts import Array, Charts, charts, cross
 from hydrograd._hydrograd import BatchError, Error, InputError, Record, Rollout, Simulator, State, _nested
 
-Given = TypeVar("Given")
 Made = TypeVar("Made")
 
 
@@ -140,33 +140,50 @@ def finite(place: str, array: Array) -> None:
         raise InputError(f"{place}{[int(i) for i in at]}: got {array[at]}; must be finite")
 
 
-def each(work: Callable[[Given], Made], given: Iterable[Given]) -> list[Made]:
+class _Left(Exception):
+    """Ends work for a batch that nobody waits for any more."""
+
+
+def each(work: Callable[..., Made], given: Iterable[Any], *, alone: bool = False, stops: bool = False) -> list[Made]:
     """Does work that leaves the interpreter's lock on all cores; results in order.
 
-    Where some fail, all are done all the same, and the `BatchError` has what they came to.
+    Where some fail, all are done all the same, and the `BatchError` has what they came to; one that is `alone` is no
+    batch of one, and fails by itself. What else is raised, Ctrl-C among it, ends the batch and comes out: what waits is
+    left undone, and with `stops` what runs ends too, by the `progress` that it is given.
     """
-    listed = list(given)
-    if len(listed) < 2:
-        return [work(one) for one in listed]
-    results: list[Callable[[], Made]]
-    if _nested():
-        # A controller of a batch that has batches of its own: the threads are taken by members that wait for it, so
-        # it does the work itself.
-        results = [functools.partial(work, one) for one in listed]
-    else:
-        results = [_pool(os.getpid()).submit(work, one).result for one in listed]
+    listed, left = list(given), threading.Event()
+
+    def stop(done: int, total: int) -> None:
+        if left.is_set():
+            raise _Left
+
+    do = functools.partial(work, progress=stop) if stops else work
+    if alone and len(listed) == 1:
+        return [do(listed[0])]
+    futures: list[Future[Made]] = []
     members: list[Any] = []
     errors: dict[int, Error] = {}
-    for b, result in enumerate(results):
-        try:
-            members.append(result())
-        except BatchError as error:
-            # A batch of one.
-            errors[b] = error.errors[0]
-            members += error.members
-        except Error as error:
-            errors[b] = error
-            members.append(None)
+    try:
+        # A controller of a batch that has batches of its own: the threads are taken by members that wait for it, so
+        # it does the work itself.
+        if len(listed) > 1 and not _nested():
+            for one in listed:
+                futures.append(_pool(os.getpid()).submit(do, one))
+        for b, one in enumerate(listed):
+            try:
+                members.append(futures[b].result() if futures else do(one))
+            except BatchError as error:
+                # A batch of one.
+                errors[b] = error.errors[0]
+                members += error.members
+            except Error as error:
+                errors[b] = error
+                members.append(None)
+    except BaseException:
+        left.set()
+        for future in futures:
+            future.cancel()
+        raise
     if errors:
         b, first = next(iter(errors.items()))
         failed = BatchError(f"{len(errors)} of {len(listed)} members failed, counted from 0; member {b}: {first}")
@@ -181,19 +198,22 @@ def _pool(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="hydrograd")
 
 
-def roll(physics: Physics, controls: Array, q: Array, v: Array, values: Array, gains: Array) -> list[Rollout]:
-    """Rollouts of controls (batch, steps, control_size) from unit q (batch, q_size) and v (batch, v_size)."""
+def roll(
+    physics: Physics, controls: Array, q: Array, v: Array, values: Array, gains: Array, alone: bool = False
+) -> list[Rollout]:
+    """Rollouts of controls (batch, steps, control_size) from unit q (batch, q_size) and v (batch, v_size); one that is
+    `alone` is no batch of one."""
     sims = physics.variants(values, gains)
-    if len(sims) > 1 and all(sim is sims[0] for sim in sims):
-        return sims[0].rollout_batch(controls, q=q, v=v)
-    if len(sims) == 1:
+    if alone and len(sims) == 1:
         return [sims[0].rollout(controls[0], q=q[0], v=v[0])]
+    if sims and all(sim is sims[0] for sim in sims):
+        return sims[0].rollout_batch(controls, q=q, v=v)
 
-    def one(b: int) -> Rollout:
+    def one(b: int, progress: Callable[[int, int], None]) -> Rollout:
         this = slice(b, b + 1)
-        return sims[b].rollout_batch(controls[this], q=q[this], v=v[this])[0]
+        return sims[b].rollout_batch(controls[this], q=q[this], v=v[this], progress=progress)[0]
 
-    return each(one, range(len(sims)))
+    return each(one, range(len(sims)), stops=True)
 
 
 def observe(physics: Physics, steps: int, rollouts: Sequence[Rollout]) -> Observed:
@@ -216,10 +236,12 @@ def seen(observed: Observed) -> list[Array]:
     return [array for array in observed if array is not None]
 
 
-def pull(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, bar: Observed) -> Pulled:
+def pull(
+    physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, bar: Observed, alone: bool = False
+) -> Pulled:
     """Transpose of rollouts that began at `q`, with the `lengths` that its quaternions were given with."""
 
-    def one(b: int) -> tuple[Array, Array, Array, list[float], Array]:
+    def one(b: int, progress: Callable[[int, int], None]) -> tuple[Array, Array, Array, list[float], Array]:
         rollout, chart = rollouts[b], physics.charts
         seeds: dict[str, Array] = {}
         if bar.positions is not None:
@@ -232,14 +254,16 @@ def pull(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array
             seeds["q"] = chart.tangent(rollout.q, bar.q[b])
         if bar.v is not None:
             seeds["v"] = bar.v[b]
-        made = rollout.vjp(**seeds)
+        made = rollout.vjp(**seeds, progress=progress)
         values = [made.parameters[name] for name in physics.names]
         return made.controls, made.initial_q, made.initial_v, values, made.gains
 
-    return _stacked(physics, each(one, range(len(rollouts))), q, lengths)
+    return _stacked(physics, each(one, range(len(rollouts)), alone=alone, stops=True), q, lengths)
 
 
-def push(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, along: Pulled) -> Observed:
+def push(
+    physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, along: Pulled, alone: bool = False
+) -> Observed:
     """Tangents of rollouts that began at `q`, a row for each of `along`; rows of the same rollout share its work."""
     chart, sim, rows = physics.charts, physics.sim, _together(rollouts)
     turned = chart.turned(q, lengths, along.q)
@@ -258,14 +282,20 @@ def push(physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array
         np.empty((batch, states, sim.q_size)),
         np.empty((batch, states, sim.v_size)),
     )
-    for of, made in zip(rows.values(), each(one, rows), strict=True):
+    for of, made in zip(rows.values(), each(one, rows, alone=alone), strict=True):
         for array, part in zip(seen(out), seen(made), strict=True):
             array[of] = part
     return out
 
 
 def push_step(
-    physics: Physics, records: Sequence[Record], q: Array, lengths: Array, after: Array, along: Pulled
+    physics: Physics,
+    records: Sequence[Record],
+    q: Array,
+    lengths: Array,
+    after: Array,
+    along: Pulled,
+    alone: bool = False,
 ) -> tuple[Array, Array]:
     """Tangents of q and v after steps from `q` to `after`, a row for each of `along`."""
     turned, rows = physics.charts.turned(q, lengths, along.q), _together(records)
@@ -275,7 +305,7 @@ def push_step(
         return records[first].jvp(q=turned[of], v=along.v[of], u=along.controls[of], **_named(physics, along, of))
 
     dq, dv = np.empty_like(after), np.empty_like(along.v)
-    for of, (q_part, v_part) in zip(rows.values(), each(one, rows), strict=True):
+    for of, (q_part, v_part) in zip(rows.values(), each(one, rows, alone=alone), strict=True):
         dq[of], dv[of] = physics.charts.moved(after[of], q_part), v_part
     return dq, dv
 
@@ -331,7 +361,14 @@ def _state(sim: Simulator, q: Array, v: Array, step: int, mode: int, held: NDArr
 
 
 def advance(
-    physics: Physics, q: Array, v: Array, controls: Array, values: Array, gains: Array, memory: Memory
+    physics: Physics,
+    q: Array,
+    v: Array,
+    controls: Array,
+    values: Array,
+    gains: Array,
+    memory: Memory,
+    alone: bool = False,
 ) -> Stepped:
     """One step of each state, from unit q (batch, q_size) and v (batch, v_size) with controls (batch, control_size)."""
     sims = physics.variants(values, gains)
@@ -340,7 +377,7 @@ def advance(
         state = _state(sims[b], q[b], v[b], int(memory.step[b]), int(memory.mode[b]), memory.held[b])
         return sims[b].step(state, controls[b])
 
-    made = each(one, range(len(sims)))
+    made = each(one, range(len(sims)), alone=alone)
     fresh = Memory(np.zeros_like(memory.step), np.zeros_like(memory.mode), np.zeros_like(memory.held))
     after = Stepped(np.empty_like(q), np.empty_like(v), fresh, [record for _, record in made])
     for b, (state, _) in enumerate(made):
@@ -357,6 +394,7 @@ def pull_step(
     after: Array,
     q_bar: Array | None,
     v_bar: Array | None,
+    alone: bool = False,
 ) -> Pulled:
     """Transpose of steps from `q` to `after`, with the `lengths` that the quaternions of `q` were given with."""
     seeds = None if q_bar is None else physics.charts.tangent(after, q_bar)
@@ -365,4 +403,4 @@ def pull_step(
         made = records[b].vjp(q=None if seeds is None else seeds[b], v=None if v_bar is None else v_bar[b])
         return made.controls, made.q, made.v, [made.parameters[name] for name in physics.names], made.gains
 
-    return _stacked(physics, each(one, range(len(records))), q, lengths)
+    return _stacked(physics, each(one, range(len(records)), alone=alone), q, lengths)

@@ -43,7 +43,7 @@ class Tangents:
     rotations: NDArray[np.float64]
     """Of the bodies' rotations, (N + 1, bodies, 3): δθ of δR = δθ × R, rad, world axes."""
     observables: dict[str, NDArray[np.float64]]
-    """Of the other observables that were asked for, by name, (N + 1, …)."""
+    """Of the other observables that were asked for, by name, (N + 1, …); "site_rotations" as `rotations`, (N + 1, sites, 3)."""
 
 
 @dataclass(frozen=True, eq=False)

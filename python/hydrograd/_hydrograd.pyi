@@ -126,7 +126,7 @@ def mesh(
 ) -> Shape:
     """A closed triangle mesh: from arrays `vertices` (n, 3) and `faces` (m, 3) of vertex numbers counted from 0,
     counter-clockwise seen from outside; from anything that has them as attributes, such as a mesh of trimesh; or from
-    the path of an OBJ, STL or PLY file. `scale` is the factor from its unit to m."""
+    the path of an OBJ, STL, PLY or DAE file, which is read where it is wanted. `scale` is the factor from its unit to m."""
 
 @final
 class Joint:
@@ -317,6 +317,7 @@ def inspect_robot(
     """What a robot in a URDF file comes to in water of `density` (kg/m³): tree, masses, weight against buoyancy, meshes that were replaced, and what of the file wasn't
     used. Choices are those of `Scene.add_robot`."""
 
+@final
 class Scene:
     """What a simulation starts from: the fluid, walls, and bodies with their joints.
 
@@ -336,10 +337,10 @@ class Scene:
     ) -> Scene: ...
     @staticmethod
     def load(path: _Path) -> Scene:
-        """Reads a scene file (TOML); paths of meshes are relative to it."""
+        """Reads a scene file (TOML); paths of meshes are relative to it, and absolute in the scene."""
     @staticmethod
     def from_toml(text: str, folder: _Path | None = None) -> Scene:
-        """A scene from TOML text; paths of meshes are relative to `folder`."""
+        """A scene from TOML text; paths of meshes are relative to `folder`, and absolute in the scene."""
     @staticmethod
     def from_urdf(
         path: _Path,
@@ -396,7 +397,7 @@ class Scene:
         self, point: ArrayLike, normal: ArrayLike, surface: Literal["rigid", "free"] = "rigid"
     ) -> None:
         """Adds a plane wall through `point` (m) with `normal` into the fluid. `surface` is "rigid", or "free" for a flat free
-        surface without waves (fidelity "reduced" only)."""
+        surface without waves (with the fidelities "reduced" and "auto", and "full" by panels)."""
     @overload
     def add_force(
         self,
@@ -652,7 +653,7 @@ class Simulator:
         held: Sequence[bool] | None = None,
     ) -> State:
         """The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
-        where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+        where the simulator starts, with joints that a motion drives where that has them then. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
         step that led here, by default none."""
     def step(self, state: State, u: ArrayLike | None = None) -> tuple[State, Record]:
         """One step from a state with the controls `u` (control_size,), N and N m: the next state, and the record that has the
@@ -667,8 +668,8 @@ class Simulator:
         self, q: ArrayLike | None = None, v: ArrayLike | None = None, u: ArrayLike | None = None, *, step: int = 0
     ) -> tuple[_Array, _Array]:
         """The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
-        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
-        `step` is the number of the step, and so the time, of motions and currents."""
+        `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, with joints that a motion drives where that has them
+        then, and no control. `step` is the number of the step, and so the time, of motions and currents."""
     def gradcheck(self, steps: int | None = None, *, directions: int = 4, seed: int = 0) -> dict[str, Any]:
         """Holds the gradient of a rollout of `steps` steps (the scene's number by default) against central differences, along so many random `directions` in each group (controls,
         initial state, parameters, gains), and says by how much the trajectory magnifies small changes. A dictionary: "max_rel_error", the largest over all directions of the smallest
@@ -1072,7 +1073,7 @@ class Rollout:
         """Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
         space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
         (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-        cotangents of others by name, each in the shape that `observe` gives; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
+        cotangents of others by name, each in the shape that `observe` gives, but of "q", "rotations" and "site_rotations" in the tangent space, as `q` and `rotations`; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
     def jvp(
         self,
         *,
@@ -1097,7 +1098,7 @@ class Rollout:
         of: Sequence[str] | None = None,
         states: Sequence[int] | None = None,
     ) -> dict[str, _Array]:
-        """Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" as δθ) at `states` (all where None; negative numbers count from the end)
+        """Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" and "site_rotations" as δθ) at `states` (all where None; negative numbers count from the end)
         with respect to the `parameters` named, and where True the initial `q` (in its tangent space) and `v`, the `gains`, and the `controls` of all steps: by name an array
         (states, …, columns) whose columns come in that order. It costs a few runs, whatever the number of columns. Ctrl-C ends it."""
     def step_jacobians(self, parameters: Sequence[str] | None = None) -> tuple[_Array, ...]:
@@ -1398,7 +1399,7 @@ def ilqr(
 
     It makes `iterations` at most, and ends once one lowers the cost, or expects to, by less than `tolerance` of it, or the cost is at most `target`. `regularisation` is the part by which each control's
     curvature is made larger at first, `trials` the most lengths of a step that are tried. `progress(p)` is called after every iteration with an `IlqrProgress`; where it gives True the plan so far is
-    what is found. Ctrl-C ends it."""
+    what is found. What it raises ends it and comes out, and so does what a cost or a controller of your own raises. Ctrl-C ends it."""
 def minimise(
     function: Callable[[_Array], _Evaluated],
     start: ArrayLike,

@@ -43,7 +43,8 @@ class Memo(Generic[Kept]):
 
     @staticmethod
     def key(physics: Physics, arrays: Sequence[NDArray[Any]]) -> Any:
-        return (physics, *(array.tobytes() for array in arrays))
+        # Arrays of nothing differ by their shapes alone.
+        return (physics, *((array.shape, array.tobytes()) for array in arrays))
 
     def put(self, key: Any, made: Kept) -> None:
         with self._lock:
@@ -66,12 +67,12 @@ steps_kept: Memo[Stepped] = Memo(1024)
 
 @dataclass(frozen=True)
 class Host:
-    """Work for the host on arrays with one batch dimension before their `inner` ones.
+    """Work for the host on arrays with one batch dimension before their `inner` ones; it is told whether they had none.
 
     Hosts that do the same are equal, so that JAX compiles what calls them once.
     """
 
-    work: Callable[[Physics, Sequence[NDArray[Any]]], Sequence[NDArray[Any]]]
+    work: Callable[[Physics, Sequence[NDArray[Any]], bool], Sequence[NDArray[Any]]]
     physics: Physics
     inner: tuple[int, ...]
 
@@ -83,7 +84,7 @@ class Host:
         for array, n in zip(arrays, self.inner, strict=True):
             last = array.shape[array.ndim - n :]
             flat.append(np.broadcast_to(array, (*lead, *last)).reshape((size, *last)))
-        return tuple(part.reshape((*lead, *part.shape[1:])) for part in self.work(self.physics, flat))
+        return tuple(part.reshape((*lead, *part.shape[1:])) for part in self.work(self.physics, flat, lead == ()))
 
     def call(self, arrays: Sequence[Array], out: Sequence[tuple[tuple[int, ...], Any]]) -> tuple[Array, ...]:
         """Its result in JAX, given the shape and dtype of each part."""
@@ -216,28 +217,28 @@ def _observed(physics: Physics, arrays: Sequence[Array]) -> list[tuple[tuple[int
     return [((*lead, *shape), q.dtype) for shape in inner]
 
 
-def _roll(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
-    return _bridge.seen(_bridge.observe(physics, flat[0].shape[1], _rolled(physics, flat)))
+def _roll(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
+    return _bridge.seen(_bridge.observe(physics, flat[0].shape[1], _rolled(physics, flat, alone)))
 
 
-def _roll_and_keep(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
-    rollouts = _rolled(physics, flat)
+def _roll_and_keep(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
+    rollouts = _rolled(physics, flat, alone)
     rollouts_kept.put(Memo.key(physics, flat), rollouts)
     return _bridge.seen(_bridge.observe(physics, flat[0].shape[1], rollouts))
 
 
-def _rolled(physics: Physics, flat: Sequence[NDArray[Any]]) -> list[Rollout]:
+def _rolled(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> list[Rollout]:
     controls, q, v, values, gains = flat
     begin, _ = physics.charts.normalise("rollout", q)
-    return _bridge.roll(physics, controls, begin, v, values, gains)
+    return _bridge.roll(physics, controls, begin, v, values, gains, alone)
 
 
-def _push(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+def _push(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
     began, first = _together(flat[:5])
-    rollouts = rollouts_kept.take(Memo.key(physics, began)) or _rolled(physics, began)
+    rollouts = rollouts_kept.take(Memo.key(physics, began)) or _rolled(physics, began, alone)
     begin, lengths = physics.charts.normalise("rollout", began[1])
     made = [rollouts[row] for row in first]
-    return _bridge.seen(_bridge.push(physics, made, begin[first], lengths[first], Pulled(*flat[5:])))
+    return _bridge.seen(_bridge.push(physics, made, begin[first], lengths[first], Pulled(*flat[5:]), alone))
 
 
 def _together(arrays: Sequence[NDArray[Any]]) -> tuple[list[NDArray[Any]], list[int]]:
@@ -248,11 +249,11 @@ def _together(arrays: Sequence[NDArray[Any]]) -> tuple[list[NDArray[Any]], list[
     return [array[kept] for array in arrays], first
 
 
-def _pull(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+def _pull(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
     began, bar = flat[:5], Observed(*flat[5:])
-    rollouts = rollouts_kept.take(Memo.key(physics, began)) or _rolled(physics, began)
+    rollouts = rollouts_kept.take(Memo.key(physics, began)) or _rolled(physics, began, alone)
     begin, lengths = physics.charts.normalise("rollout", began[1])
-    return _given(_bridge.pull(physics, rollouts, begin, lengths, bar), began[4])
+    return _given(_bridge.pull(physics, rollouts, begin, lengths, bar, alone), began[4])
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
@@ -282,36 +283,38 @@ def _next(given: Sequence[Array]) -> list[tuple[tuple[int, ...], Any]]:
     return [(array.shape, array.dtype) for array in (q, v, *memory)]
 
 
-def _advance(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
-    after = _advanced(physics, flat)
+def _advance(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
+    after = _advanced(physics, flat, alone)
     return after.q, after.v, *after.memory
 
 
-def _advance_and_keep(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
-    after = _advanced(physics, flat)
+def _advance_and_keep(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
+    after = _advanced(physics, flat, alone)
     steps_kept.put(Memo.key(physics, flat), after)
     return after.q, after.v, *after.memory
 
 
-def _advanced(physics: Physics, flat: Sequence[NDArray[Any]]) -> Stepped:
+def _advanced(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Stepped:
     controls, q, v, values, gains, *memory = flat
     begin, _ = physics.charts.normalise("step", q)
-    return _bridge.advance(physics, begin, v, controls, values, gains, Memory(*memory))
+    return _bridge.advance(physics, begin, v, controls, values, gains, Memory(*memory), alone)
 
 
-def _push_step(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+def _push_step(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
     began, first = _together(flat[:8])
-    after = steps_kept.take(Memo.key(physics, began)) or _advanced(physics, began)
+    after = steps_kept.take(Memo.key(physics, began)) or _advanced(physics, began, alone)
     begin, lengths = physics.charts.normalise("step", began[1])
     records = [after.records[row] for row in first]
-    return _bridge.push_step(physics, records, begin[first], lengths[first], after.q[first], Pulled(*flat[8:]))
+    along = Pulled(*flat[8:])
+    return _bridge.push_step(physics, records, begin[first], lengths[first], after.q[first], along, alone)
 
 
-def _pull_step(physics: Physics, flat: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+def _pull_step(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:
     began, (q_bar, v_bar) = flat[:8], flat[8:]
-    after = steps_kept.take(Memo.key(physics, began)) or _advanced(physics, began)
+    after = steps_kept.take(Memo.key(physics, began)) or _advanced(physics, began, alone)
     begin, lengths = physics.charts.normalise("step", began[1])
-    return _given(_bridge.pull_step(physics, after.records, begin, lengths, after.q, q_bar, v_bar), began[4])
+    pulled = _bridge.pull_step(physics, after.records, begin, lengths, after.q, q_bar, v_bar, alone)
+    return _given(pulled, began[4])
 
 
 def _given(pulled: Pulled, gains: NDArray[Any]) -> Pulled:

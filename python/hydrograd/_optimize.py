@@ -169,7 +169,7 @@ class Replan:
     seconds: float
     """Time that it took, s."""
     failure: str | None
-    """Why it failed; the plan before then goes on."""
+    """Why it failed, what a cost or a controller of your own raised included; the plan before then goes on."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,7 @@ def rollout(
         **_bridge.adjustable("rollout", sim, parameters, gains, _value),
     }
     lead, flat = _flat("rollout", physics, parts)
-    work = _Rolling(physics)
+    work = _Rolling(physics, lead == ())
     made = _Run.apply(work, *flat)
     return Trajectory(*(part.reshape((*lead, *part.shape[1:])) for part in made), work.rollouts)
 
@@ -129,7 +129,7 @@ def step(
     }
     lead, flat = _flat("step", physics, parts)
     memory = _memory(state, lead, physics)
-    made = _Run.apply(_Stepping(physics), *flat, *memory)
+    made = _Run.apply(_Stepping(physics, lead == ()), *flat, *memory)
     return State(*(part.reshape((*lead, *part.shape[1:])) for part in made))
 
 
@@ -142,8 +142,8 @@ class _Rolling:
     # Arrays that it is given, and those that it gives with derivatives.
     given, differentiable = 5, 4
 
-    def __init__(self, physics: Physics) -> None:
-        self.physics = physics
+    def __init__(self, physics: Physics, alone: bool) -> None:
+        self.physics, self.alone = physics, alone
         self.rollouts: list[Rollout] = []
         self._made: dict[Key, Rollout] = {}
 
@@ -151,7 +151,7 @@ class _Rolling:
         """What is observed of the rollouts."""
         physics, (controls, q, v, values, gains) = self.physics, arrays
         begin, _ = physics.charts.normalise("rollout", q)
-        self.rollouts = _bridge.roll(physics, controls, begin, v, values, gains)
+        self.rollouts = _bridge.roll(physics, controls, begin, v, values, gains, self.alone)
         self._made.update(zip(_keys(arrays), self.rollouts, strict=True))
         return _bridge.seen(_bridge.observe(physics, controls.shape[1], self.rollouts))
 
@@ -164,11 +164,11 @@ class _Rolling:
 
     def push(self, arrays: Sequence[Array], along: Sequence[Array]) -> Sequence[Array]:
         """Tangents of what is observed."""
-        return _bridge.seen(_bridge.push(self.physics, *self._of(arrays), Pulled(*along)))
+        return _bridge.seen(_bridge.push(self.physics, *self._of(arrays), Pulled(*along), self.alone))
 
     def pull(self, arrays: Sequence[Array], bars: Sequence[Array | None]) -> Pulled:
         """Cotangents of what the rollouts begin with."""
-        return _bridge.pull(self.physics, *self._of(arrays), Observed(*bars))
+        return _bridge.pull(self.physics, *self._of(arrays), Observed(*bars), self.alone)
 
 
 class _Stepping:
@@ -176,15 +176,15 @@ class _Stepping:
 
     given, differentiable = 8, 2
 
-    def __init__(self, physics: Physics) -> None:
-        self.physics = physics
+    def __init__(self, physics: Physics, alone: bool) -> None:
+        self.physics, self.alone = physics, alone
         self._made: dict[Key, tuple[Record, Array]] = {}
 
     def run(self, arrays: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
         """q, v and memory after the steps."""
         controls, q, v, values, gains, *memory = arrays
         begin, _ = self.physics.charts.normalise("step", q)
-        after = _bridge.advance(self.physics, begin, v, controls, values, gains, Memory(*memory))
+        after = _bridge.advance(self.physics, begin, v, controls, values, gains, Memory(*memory), self.alone)
         # A copy: what leaves may be changed in place.
         made = zip(after.records, after.q.copy(), strict=True)
         self._made.update(zip(_keys(arrays), made, strict=True))
@@ -201,12 +201,12 @@ class _Stepping:
 
     def push(self, arrays: Sequence[NDArray[Any]], along: Sequence[Array]) -> Sequence[Array]:
         """Tangents of q and v."""
-        return _bridge.push_step(self.physics, *self._of(arrays), Pulled(*along))
+        return _bridge.push_step(self.physics, *self._of(arrays), Pulled(*along), self.alone)
 
     def pull(self, arrays: Sequence[NDArray[Any]], bars: Sequence[Array | None]) -> Pulled:
         """Cotangents of what the steps begin with."""
         q_bar, v_bar = bars
-        return _bridge.pull_step(self.physics, *self._of(arrays), q_bar, v_bar)
+        return _bridge.pull_step(self.physics, *self._of(arrays), q_bar, v_bar, self.alone)
 
 
 Work = _Rolling | _Stepping
@@ -256,7 +256,7 @@ class _Run(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, dims: Sequence[int | None], work: Work, *tensors: Tensor) -> Any:
-        size = info.batch_size
+        size, work.alone = info.batch_size, False
         return _parted(size, _Run.apply(work, *_joined(size, dims[1:], tensors)))
 
 

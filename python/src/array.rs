@@ -271,3 +271,23 @@ pub fn matrix<'py>(
     let values = matrix.transpose().as_slice().to_vec();
     to_python(py, values, &[matrix.nrows(), matrix.ncols()])
 }
+
+/// Rows of one length, one below the other.
+pub fn columns<'py>(
+    py: Python<'py>,
+    each: &[DVector<f64>],
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let n = each.first().map_or(0, DVector::len);
+    let all = each.iter().flat_map(|x| x.iter().copied()).collect();
+    to_python(py, all, &[each.len(), n])
+}
+
+/// Matrices of one shape, the first index their number.
+pub fn matrices<'py>(
+    py: Python<'py>,
+    each: &[DMatrix<f64>],
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let (rows, cols) = each.first().map_or((0, 0), |m| m.shape());
+    let all = each.iter().flat_map(|m| m.transpose().as_slice().to_vec());
+    to_python(py, all.collect(), &[each.len(), rows, cols])
+}

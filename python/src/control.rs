@@ -2,16 +2,16 @@
 
 use crate::array::{self, Dim, array};
 use crate::cost::CostTerm;
-use crate::error::{OrRaise, input, internal};
+use crate::error::{input, internal};
 use crate::interrupt::{Interrupt, Progress, Told, followed, lock, long, short};
 use crate::optimize::class;
 use crate::rollout::Rollout;
 use crate::simulator::Simulator;
 use crate::state::State;
+use crate::tracking::Tracking;
 use hydrograd::optimize::{
     self, Cost, Guess, IlqrProgress, IlqrSettings, IlqrStop, MpcSettings, Plan, Problem, Replan,
 };
-use hydrograd::simulate::{Action, Observation, Policy};
 use hydrograd::{Error, dynamics};
 use nalgebra::{DMatrix, DVector};
 use numpy::PyArrayDyn;
@@ -21,77 +21,9 @@ use pyo3::types::{PyDict, PyList};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
-type Numbers<'py> = Bound<'py, PyArrayDyn<f64>>;
-
 fn stopped(stop: IlqrStop) -> String {
     let stop = serde_json::to_value(stop).unwrap_or_default();
     stop.as_str().unwrap_or_default().to_string()
-}
-
-/// The feedback that holds a robot to a plan, `u = ū + K (x ⊖ x̄)` within the plan's limits: a policy, for `Simulator.with_policy`. Before the plan starts and after it has ended
-/// the nearest controls are held, without feedback.
-#[pyclass(frozen, module = "hydrograd")]
-pub struct Tracking {
-    /// The Rust side's.
-    pub inner: optimize::Tracking,
-}
-
-struct Seen {
-    time: f64,
-    q: DVector<f64>,
-    v: DVector<f64>,
-}
-
-impl Seen {
-    fn of(observation: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let row = |name: &str| -> PyResult<DVector<f64>> {
-            let given = observation.getattr(name)?;
-            Ok(array::row(&format!("tracking: {name}"), &given)?.into())
-        };
-        Ok(Self {
-            time: observation.getattr("time")?.extract()?,
-            q: row("q")?,
-            v: row("v")?,
-        })
-    }
-
-    fn observation(&self) -> Observation<'_> {
-        Observation {
-            step: 0,
-            time: self.time,
-            q: &self.q,
-            v: &self.v,
-            mode: 0,
-        }
-    }
-}
-
-#[pymethods]
-impl Tracking {
-    /// The controls, (control_size,), at an observation: its `time`, `q` and `v`.
-    fn act<'py>(&self, observation: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let seen = Seen::of(observation)?;
-        let Action { control, .. } = self.inner.act(&seen.observation()).or_raise()?;
-        let n = control.len();
-        array::to_python(observation.py(), control, &[n])
-    }
-
-    /// Transpose of `act`: cotangents (q_bar, v_bar) from that of the controls.
-    fn act_vjp<'py>(
-        &self,
-        observation: &Bound<'py, PyAny>,
-        control_bar: &Bound<'py, PyAny>,
-    ) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
-        let seen = Seen::of(observation)?;
-        let bar = DVector::from_vec(array::row("tracking: control_bar", control_bar)?);
-        let found = self.inner.act_vjp(&seen.observation(), &bar).or_raise()?;
-        let n = seen.v.len();
-        let full = |x: Vec<f64>| match x.is_empty() {
-            true => array::to_python(observation.py(), vec![0.0; n], &[n]),
-            false => array::to_python(observation.py(), x, &[n]),
-        };
-        Ok((full(found.q)?, full(found.v)?))
-    }
 }
 
 /// A sum of terms.
@@ -122,7 +54,9 @@ fn limits(place: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
     }
 }
 
+/// What is to be found; errors call what is given `place`'s.
 fn problem(
+    place: &str,
     cost: Vec<PyRef<'_, CostTerm>>,
     knots: usize,
     hold: usize,
@@ -130,7 +64,7 @@ fn problem(
     upper: Option<&Bound<'_, PyAny>>,
     previous: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Problem> {
-    let previous = previous.map(|given| array::row("ilqr: previous", given));
+    let previous = previous.map(|given| array::row(&format!("{place}: previous"), given));
     Ok(Problem {
         knots,
         hold,
@@ -150,7 +84,16 @@ enum Start {
 
 impl Start {
     fn of(given: Option<&Bound<'_, PyAny>>, shift: usize, controls: usize) -> PyResult<Self> {
+        let unmoved = || match shift {
+            0 => Ok(()),
+            _ => Err(input(
+                "ilqr: shift",
+                shift,
+                "must be 0 unless the guess is a plan, which is so many time steps on its way",
+            )),
+        };
         let Some(given) = given else {
+            unmoved()?;
             return Ok(Self::Zero);
         };
         let tracking = match given.cast::<Tracking>() {
@@ -161,6 +104,7 @@ impl Start {
             let tracking = tracking.cast_into::<Tracking>()?;
             return Ok(Self::Plan(tracking.get().inner.clone(), shift));
         }
+        unmoved()?;
         let shape = [Dim::Any("knots"), Dim::Is(controls)];
         Ok(Self::Controls(
             array("ilqr: guess", given, &shape)?.columns(controls),
@@ -200,23 +144,9 @@ fn start(
     given.map_or_else(|| simulator.initial(), |state| state.get().of(simulator))
 }
 
-fn columns<'py>(py: Python<'py>, each: &[DVector<f64>]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let n = each.first().map_or(0, DVector::len);
-    let all = each.iter().flat_map(|x| x.iter().copied()).collect();
-    array::to_python(py, all, &[each.len(), n])
-}
-
-fn matrices<'py>(py: Python<'py>, each: &[DMatrix<f64>]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let (rows, cols) = each.first().map_or((0, 0), |m| m.shape());
-    let all = each.iter().flat_map(|m| m.transpose().as_slice().to_vec());
-    array::to_python(py, all.collect(), &[each.len(), rows, cols])
-}
-
 fn planned<'py>(simulator: &Bound<'py, Simulator>, plan: Plan) -> PyResult<Bound<'py, PyAny>> {
     let py = simulator.py();
-    let tracking = Tracking {
-        inner: plan.tracking(),
-    };
+    let tracking = Tracking::new(simulator, plan.tracking());
     let seconds = PyDict::new(py);
     for (name, time) in [
         ("rollouts", plan.times.rollouts),
@@ -231,8 +161,8 @@ fn planned<'py>(simulator: &Bound<'py, Simulator>, plan: Plan) -> PyResult<Bound
     let fields = PyDict::new(py);
     let nu = plan.controls.nrows();
     fields.set_item("controls", array::transposed(py, &plan.controls, &[nu])?)?;
-    fields.set_item("gains", matrices(py, &plan.gains)?)?;
-    fields.set_item("steps", columns(py, &plan.steps)?)?;
+    fields.set_item("gains", array::matrices(py, &plan.gains)?)?;
+    fields.set_item("steps", array::columns(py, &plan.steps)?)?;
     fields.set_item("cost", plan.cost())?;
     fields.set_item("costs", array::to_python(py, costs, &[count])?)?;
     fields.set_item("gradient", plan.gradient)?;
@@ -257,7 +187,7 @@ fn planned<'py>(simulator: &Bound<'py, Simulator>, plan: Plan) -> PyResult<Bound
 ///
 /// It makes `iterations` at most, and ends once one lowers the cost, or expects to, by less than `tolerance` of it, or the cost is at most `target`. `regularisation` is the part by which each control's
 /// curvature is made larger at first, `trials` the most lengths of a step that are tried. `progress(p)` is called after every iteration with an `IlqrProgress`; where it gives True the plan so far is
-/// what is found. Ctrl-C ends it.
+/// what is found. What it raises ends it and comes out, and so does what a cost or a controller of your own raises. Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
     simulator, cost, *, knots, hold=1, lower=None, upper=None, previous=None, state=None, guess=None, shift=0, iterations=100, tolerance=1e-9, target=None, regularisation=0.0,
@@ -284,7 +214,7 @@ pub fn ilqr<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let me = simulator.get();
-    let problem = problem(cost, knots, hold, lower, upper, previous)?;
+    let problem = problem("ilqr", cost, knots, hold, lower, upper, previous)?;
     let start = Start::of(guess, shift, me.controls_size())?;
     let state = state.map(|state| state.clone().unbind());
     let settings = IlqrSettings {
@@ -310,7 +240,7 @@ pub fn ilqr<'py>(
 /// before, moved on; the first one by `first_iterations`. Between plans the plan's `feedback` acts, or its controls alone. Other keywords are those of `ilqr`.
 ///
 /// The plant may be a robot, which asks for controls step by step (`control`), or a simulator (`run`): the model itself, or one of another fidelity, current, parameters or time step.
-#[pyclass(frozen, module = "hydrograd")]
+#[pyclass(frozen, module = "hydrograd.optimize")]
 pub struct Mpc {
     planner: Arc<Planner>,
     problem: Problem,
@@ -436,7 +366,7 @@ impl Mpc {
         tolerance: f64,
         trials: usize,
     ) -> PyResult<Self> {
-        let problem = problem(cost, knots, hold, lower, upper, previous)?;
+        let problem = problem("mpc", cost, knots, hold, lower, upper, previous)?;
         let base = MpcSettings::default();
         let settings = MpcSettings {
             every,
@@ -579,5 +509,6 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<CostTerm>()?;
     m.add_class::<Tracking>()?;
     m.add_class::<Mpc>()?;
+    m.add_function(wrap_pyfunction!(crate::tracking::_tracking, m)?)?;
     m.add_function(wrap_pyfunction!(ilqr, m)?)
 }

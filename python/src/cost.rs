@@ -13,7 +13,7 @@ use pyo3::types::PyTuple;
 ///
 /// It is the sum of `weights` times squared entries: one weight for all, or one each. A running term is integrated over time: at every knot but the last it counts its value times
 /// the knot's duration. With `last=True` it counts once, at the end. Targets stand, or move: with `times` (n,), s, of the simulation's clock, `target` has a row for each, and goes straight from row to row.
-#[pyclass(frozen, module = "hydrograd")]
+#[pyclass(frozen, module = "hydrograd.cost")]
 #[derive(Clone)]
 pub struct CostTerm {
     /// The term.
@@ -88,9 +88,15 @@ impl CostTerm {
         times: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let weights = self::weights("effort", weights)?;
-        let term = match target {
-            None => terms::effort(weights),
-            Some(target) => terms::control(self::target("effort", target, times)?, weights),
+        let term = match (target, times) {
+            (None, None) => terms::effort(weights),
+            (None, Some(times)) => {
+                let remedy = "give a `target` with a row for each, or leave them out";
+                return Err(input("effort: times", times.repr()?, remedy));
+            }
+            (Some(target), times) => {
+                terms::control(self::target("effort", target, times)?, weights)
+            }
         };
         Ok(Self { term, last: false })
     }

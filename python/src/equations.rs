@@ -405,11 +405,11 @@ impl Simulator {
         [q, v, u]: [Option<&Bound<'_, PyAny>>; 3],
         step: usize,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let (q0, v0) = self.inner.start();
+        let (q0, v0) = self.inner.placed(step, None, None).or_raise()?;
         let (nv, nu) = (v0.len(), self.controls_size());
         let parts = [
-            Rows::or("linearise: q", q, q0)?,
-            Rows::or("linearise: v", v, v0)?,
+            Rows::or("linearise: q", q, &q0)?,
+            Rows::or("linearise: v", v, &v0)?,
             Rows::or("linearise: u", u, &DVector::zeros(nu))?,
         ];
         let many = || parts.iter().filter(|rows| rows.is_many);

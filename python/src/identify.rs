@@ -11,6 +11,7 @@ use hydrograd::optimize::{self, IdentifyProgress, IdentifySettings, Loss, Record
 use hydrograd::simulate::observable::observable;
 use hydrograd::{Controls, Error};
 use nalgebra::{DMatrix, DVector};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -83,11 +84,17 @@ impl Unknown {
 #[pyclass(frozen, module = "hydrograd.optimize")]
 pub struct Experiment {
     inner: Mutex<optimize::Experiment>,
+    /// Holds a controller written in Python, which `inner` only points at.
+    simulator: Py<Simulator>,
     steps: usize,
 }
 
 #[pymethods]
 impl Experiment {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.simulator)
+    }
+
     #[new]
     #[pyo3(signature = (name, simulator, *, steps=None, controls=None, start_within=None))]
     fn new(
@@ -118,6 +125,7 @@ impl Experiment {
         }
         Ok(Self {
             inner: Mutex::new(inner),
+            simulator: simulator.clone().unbind(),
             steps,
         })
     }

@@ -34,6 +34,7 @@ mod simulation;
 mod simulator;
 mod state;
 mod tangents;
+mod tracking;
 mod tradeoff;
 mod video;
 

@@ -7,7 +7,7 @@ use hydrograd::objective::{self, Sum};
 use pyo3::prelude::*;
 
 /// A scalar of a rollout: made by the functions of `hydrograd.objective`, added with `+`, `-` and `sum`, and weighted with `*` and `/`.
-#[pyclass(frozen, module = "hydrograd")]
+#[pyclass(frozen, module = "hydrograd.objective")]
 #[derive(Clone)]
 pub struct Objective(pub Sum);
 

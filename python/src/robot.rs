@@ -43,9 +43,14 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
                 }
                 continue;
             }
+            if key.eq("urdf")? {
+                let remedy = "leave it out: the file is the first argument, `path`";
+                return Err(input("robot: urdf", value.repr()?, remedy));
+            }
+            let is_drag = key.eq("drag")?;
             match value.cast::<Drag>() {
-                Ok(found) => drag = Some(found.get().0),
-                Err(_) => plain.set_item(key, value)?,
+                Ok(found) if is_drag => drag = Some(found.get().0),
+                _ => plain.set_item(&key, &value)?,
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::array::{self, Dim};
 use crate::contact;
-use crate::error::{OrRaise, in_order, input};
+use crate::error::{in_order, input};
 use crate::flow;
 use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, light, long, short};
@@ -446,7 +446,7 @@ impl Rollout {
     /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
     /// space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
     /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
-    /// cotangents of others by name, each in the shape that `observe` gives; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it.
+    /// cotangents of others by name, each in the shape that `observe` gives, but of "q", "rotations" and "site_rotations" in the tangent space, as `q` and `rotations`; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it.
     #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None, density=0.0, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn vjp<'py>(
@@ -496,16 +496,9 @@ impl Rollout {
         let observables = mapping::named("vjp: observables", "an array", observables)?;
         for (name, given) in observables {
             let place = format!("vjp: observables[{name:?}]");
-            let system = self.inner.simulator().system();
-            let found = observable::observable(&name).or_raise()?;
-            let rows = observable::differentiable(&name)
-                .or_raise()?
-                .tangents(system);
-            let mut shape = found.shape(system);
-            if shape.iter().product::<usize>() != rows {
-                // Cotangents live in the tangent space.
-                shape = vec![rows];
-            }
+            // Cotangents live in the tangent space.
+            let shape = tangents::tangent_shape(&self.inner, &name)?;
+            let rows: usize = shape.iter().product();
             let mut whole = vec![Dim::Is(states)];
             whole.extend(shape.into_iter().map(Dim::Is));
             let columns = array::array(&place, &given, &whole)?.columns(rows);
@@ -545,7 +538,7 @@ impl Rollout {
         tangents::jvp(py, &self.inner, &along, observables.unwrap_or_default())
     }
 
-    /// Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" as δθ) at `states` (all where None; negative numbers count from the end)
+    /// Jacobians of the observables `of` ("q" in the tangent space of the coordinates, "rotations" and "site_rotations" as δθ) at `states` (all where None; negative numbers count from the end)
     /// with respect to the `parameters` named, and where True the initial `q` (in its tangent space) and `v`, the `gains`, and the `controls` of all steps: by name an array
     /// (states, …, columns) whose columns come in that order. It costs a few runs, whatever the number of columns. Ctrl-C ends it.
     #[pyo3(signature = (parameters=None, *, q=false, v=false, gains=false, controls=false, of=None, states=None))]

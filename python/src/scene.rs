@@ -2,7 +2,7 @@
 
 use crate::array::{fixed, or_zeros, row};
 use crate::body::Body;
-use crate::error::{OrRaise, input};
+use crate::error::{OrRaise, exception, input};
 use crate::fluid::{Contact, Fluid};
 use crate::interrupt::light;
 use crate::joint::Motion;
@@ -23,8 +23,13 @@ fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
 }
 
 /// As it is now: other threads may go on with the scene while something is made of it.
-fn copied(scene: &Bound<'_, Scene>) -> PyResult<hydrograd::Scene> {
+pub fn copied(scene: &Bound<'_, Scene>) -> PyResult<hydrograd::Scene> {
     Ok(scene.try_borrow()?.0.clone())
+}
+
+/// Whether two scenes are the same; numbers that aren't numbers too.
+fn is_same(a: &hydrograd::Scene, b: &hydrograd::Scene) -> bool {
+    a == b || a.to_toml().ok() == b.to_toml().ok()
 }
 
 /// What a simulation starts from: the fluid, walls, and bodies with their joints.
@@ -60,13 +65,13 @@ impl Scene {
         Ok(Self(scene))
     }
 
-    /// Reads a scene file (TOML); paths of meshes are relative to it.
+    /// Reads a scene file (TOML); paths of meshes are relative to it, and absolute in the scene.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         light(py, || hydrograd::Scene::load(path)).map(Self)
     }
 
-    /// A scene from TOML text; paths of meshes are relative to `folder`.
+    /// A scene from TOML text; paths of meshes are relative to `folder`, and absolute in the scene.
     #[staticmethod]
     #[pyo3(signature = (text, folder=None))]
     fn from_toml(py: Python<'_>, text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
@@ -92,12 +97,24 @@ impl Scene {
     /// `added_mass`).
     #[pyo3(signature = (path, **choices))]
     fn add_robot(
-        &mut self,
-        py: Python<'_>,
+        slf: &Bound<'_, Self>,
         path: PathBuf,
         choices: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Robot> {
-        robot::add(py, &mut self.0, path, choices)
+        let before = copied(slf)?;
+        let mut scene = before.clone();
+        let robot = robot::add(slf.py(), &mut scene, path, choices)?;
+        let mut now = slf.try_borrow_mut()?;
+        if !is_same(&now.0, &before) {
+            // What was added meanwhile would be lost.
+            return Err(exception(hydrograd::Error::Unsupported {
+                what: "add_robot to a scene that changes meanwhile".into(),
+                why: "another thread changed it while the robot's files were read".into(),
+                instead: "let one thread at a time change a scene".into(),
+            }));
+        }
+        now.0 = scene;
+        Ok(robot)
     }
 
     /// The scene as TOML text, from which `from_toml` makes an equal one.
@@ -122,7 +139,7 @@ impl Scene {
     }
 
     /// Adds a plane wall through `point` (m) with `normal` into the fluid. `surface` is "rigid", or "free" for a flat free
-    /// surface without waves (fidelity "reduced" only).
+    /// surface without waves (with the fidelities "reduced" and "auto", and "full" by panels).
     #[pyo3(signature = (point, normal, surface="rigid"))]
     fn add_wall(
         &mut self,

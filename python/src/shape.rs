@@ -107,7 +107,7 @@ fn prism(profile: &Bound<'_, PyAny>, length: f64, faces: Option<usize>) -> PyRes
 
 /// A closed triangle mesh: from arrays `vertices` (n, 3) and `faces` (m, 3) of vertex numbers counted from 0,
 /// counter-clockwise seen from outside; from anything that has them as attributes, such as a mesh of trimesh; or from
-/// the path of an OBJ, STL or PLY file. `scale` is the factor from its unit to m.
+/// the path of an OBJ, STL, PLY or DAE file, which is read where it is wanted. `scale` is the factor from its unit to m.
 #[pyfunction]
 #[pyo3(signature = (vertices, faces=None, *, scale=1.0))]
 fn mesh(
@@ -119,6 +119,8 @@ fn mesh(
         let is_path = vertices.is_instance_of::<PyString>() || vertices.hasattr("__fspath__")?;
         if is_path {
             let path: PathBuf = vertices.extract()?;
+            // It is read when it is wanted, in whatever folder the program is then.
+            let path = std::path::absolute(&path).unwrap_or(path);
             let shape = Shape::checked(hydrograd::Shape::Mesh { path, scale })?;
             // What is wrong with the file is said here, not when a simulator is made.
             shape.mesh(vertices.py())?;

@@ -1,7 +1,6 @@
 //! What simulators do: the methods of their class.
 
 use crate::array::{self, Dim, array};
-use crate::control::Tracking;
 use crate::equations::Equations;
 use crate::error::{OrRaise, batch, counts, exception, input, own};
 use crate::gradient::{self, by_name};
@@ -13,10 +12,11 @@ use crate::objective::Objective;
 use crate::policy::Controller;
 use crate::prepare::{Parts, Start, build, set_gains, warnings};
 use crate::rollout::Rollout;
-use crate::scene::Scene;
+use crate::scene::{Scene, copied};
 use crate::settings::{Keywords, row_or};
 use crate::simulator::Simulator;
 use crate::state::{Record, State};
+use crate::tracking::Tracking;
 use hydrograd::simulate::{Begin, Checkpoints, Halted, Member, Policy};
 use hydrograd::{Controls, dynamics};
 use nalgebra::{DMatrix, DVector};
@@ -30,27 +30,29 @@ use std::sync::Arc;
 use std::time::Instant;
 
 impl Simulator {
-    fn matrix(
+    /// The controls that are given, or none for so many steps.
+    fn controls(
         &self,
         place: &str,
         given: Option<&Bound<'_, PyAny>>,
         steps: Option<usize>,
-    ) -> PyResult<DMatrix<f64>> {
+    ) -> PyResult<Controls> {
         let n = self.controls_size();
         let Some(given) = given else {
-            return Ok(DMatrix::zeros(n, steps.unwrap_or(self.scene.steps)));
+            return Controls::none(&self.inner, steps.unwrap_or(self.scene.steps)).or_raise();
         };
-        let found = array(place, given, &[Dim::Any("steps"), Dim::Is(n)])?;
+        let shape = [Dim::Any("steps"), Dim::Is(n)];
+        let found = array(&format!("{place}: controls"), given, &shape)?;
         if let Some(steps) = steps
             && steps != found.shape[0]
         {
             return Err(input(
-                "rollout: steps",
+                format!("{place}: steps"),
                 steps,
                 format!("must be {}, as the controls say", found.shape[0]),
             ));
         }
-        Ok(found.columns(n))
+        Controls::from_matrix(&self.inner, found.columns(n)).or_raise()
     }
 
     /// The state where a run begins.
@@ -162,7 +164,7 @@ impl Simulator {
     )]
     fn new(
         py: Python<'_>,
-        scene: PyRef<'_, Scene>,
+        scene: &Bound<'_, Scene>,
         dt: Option<f64>,
         fidelity: Option<&str>,
         method: Option<&str>,
@@ -193,7 +195,7 @@ impl Simulator {
             shape_parameters,
             backend,
         };
-        let scene = scene.0.clone();
+        let scene = copied(scene)?;
         let choices = keywords.settings()?.resolve(&scene);
         build(py, scene, choices, cache)
     }
@@ -216,13 +218,12 @@ impl Simulator {
     ) -> PyResult<Rollout> {
         let me = slf.get();
         let start = me.begin(state, q, v)?;
-        let matrix = me.matrix("rollout: controls", controls, steps)?;
-        let (py, steps) = (slf.py(), matrix.ncols());
+        let controls = me.controls("rollout", controls, steps)?;
+        let (py, steps) = (slf.py(), controls.steps());
         let mut progress = Progress::new("rollout: progress", progress, steps)?;
         let inner = me.inner.clone();
         let started = Instant::now();
         let made = followed(py, &mut progress, move |interrupt| {
-            let controls = Controls::from_matrix(&inner, matrix)?;
             let state = start.state(&inner)?;
             Ok(inner.rollout_as_far(&state, &controls, |done| interrupt.at(done)))
         })?;
@@ -410,13 +411,12 @@ impl Simulator {
                 "must be a number of bytes above zero",
             ));
         }
-        let matrix = self.matrix("gradient_in_parts: controls", controls, steps)?;
+        let controls = self.controls("gradient_in_parts", controls, steps)?;
         let (inner, objective) = (self.inner.clone(), objective.0.clone());
-        let kept = Checkpoints::within(&inner, matrix.ncols(), memory);
-        let total = kept.work(matrix.ncols());
+        let kept = Checkpoints::within(&inner, controls.steps(), memory);
+        let total = kept.work(controls.steps());
         let mut progress = Progress::new("gradient_in_parts: progress", progress, total)?;
         let made = followed(py, &mut progress, move |interrupt| {
-            let controls = Controls::from_matrix(&inner, matrix)?;
             inner.gradient_in_parts(&controls, &objective, kept, |done| interrupt.at(done))
         });
         let made = ended(progress, made)?;
@@ -424,7 +424,7 @@ impl Simulator {
     }
 
     /// The state at coordinates `q` (q_size,) and generalised velocity `v` (v_size,) after `step` steps; what is None is
-    /// where the simulator starts. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
+    /// where the simulator starts, with joints that a motion drives where that has them then. `mode` is what the scene's controller remembers, `held` (bodies,) whose joints it held in the
     /// step that led here, by default none.
     #[pyo3(signature = (q=None, v=None, *, step=0, mode=0, held=None))]
     fn state(
@@ -446,8 +446,16 @@ impl Simulator {
             ));
         }
         let (q0, v0) = me.inner.start();
-        let (q, v) = (row_or("state: q", q, q0)?, row_or("state: v", v, v0)?);
-        let made = short(slf.py(), || me.inner.state(step, &q, &v))?;
+        let row = |place: &str, given: Option<&Bound<'_, PyAny>>, default: &DVector<f64>| {
+            given
+                .map(|given| row_or(place, Some(given), default))
+                .transpose()
+        };
+        let (q, v) = (row("state: q", q, q0)?, row("state: v", v, v0)?);
+        let (made, v) = short(slf.py(), || {
+            let (q, v) = me.inner.placed(step, q.as_ref(), v.as_ref())?;
+            Ok((me.inner.state(step, &q, &v)?, v))
+        })?;
         let state = dynamics::State { held, mode, ..made };
         Ok(State {
             simulator: slf.clone().unbind(),
@@ -509,8 +517,8 @@ impl Simulator {
     }
 
     /// The linearisation x₁ ≈ A x₀ + B u of one step in x = (q, v), coordinates in their tangent space, from the states `q` (…, q_size), `v` (…, v_size) and controls
-    /// `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, and no control.
-    /// `step` is the number of the step, and so the time, of motions and currents.
+    /// `u` (…, control_size): A (…, 2 v_size, 2 v_size) and B (…, 2 v_size, control_size), on all cores. What is None is where the simulator starts, with joints that a motion drives where that has them
+    /// then, and no control. `step` is the number of the step, and so the time, of motions and currents.
     #[pyo3(signature = (q=None, v=None, u=None, *, step=0))]
     fn linearise<'py>(
         &self,

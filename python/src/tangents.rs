@@ -137,20 +137,20 @@ fn displacements(
     Ok((made.collect::<PyResult<_>>()?, count.is_some()))
 }
 
-/// Shape of an observable's tangent at one state.
-fn tangent_shape(rollout: &hydrograd::Rollout, name: &str) -> PyResult<Vec<usize>> {
+/// Shape of an observable's tangent, and of its cotangent, at one state.
+pub fn tangent_shape(rollout: &hydrograd::Rollout, name: &str) -> PyResult<Vec<usize>> {
     let system = rollout.simulator().system();
     let rows = observable::differentiable(name)
         .or_raise()?
         .tangents(system);
-    let shape = observable::observable(name).or_raise()?.shape(system);
-    if shape.iter().product::<usize>() == rows {
-        return Ok(shape);
+    // They turn by δθ.
+    if ["rotations", "site_rotations"].contains(&name) {
+        return Ok(vec![rows / 3, 3]);
     }
-    // Rotations turn by δθ.
-    Ok(match name {
-        "rotations" => vec![system.len(), 3],
-        _ => vec![rows],
+    let shape = observable::observable(name).or_raise()?.shape(system);
+    Ok(match shape.iter().product::<usize>() == rows {
+        true => shape,
+        false => vec![rows],
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::internal;
 use crate::interrupt::long;
-use crate::scene::Scene;
+use crate::scene::{Scene, copied};
 use crate::settings::named;
 use hydrograd::tradeoff::{TradeoffSettings, measure};
 use pyo3::prelude::*;
@@ -36,7 +36,7 @@ fn all<T: VariantArray + FromStr + Into<&'static str> + Copy>(
 #[expect(clippy::too_many_arguments, reason = "one per keyword")]
 pub fn tradeoff<'py>(
     py: Python<'py>,
-    scene: PyRef<'py, Scene>,
+    scene: &Bound<'py, Scene>,
     fidelities: Option<Vec<String>>,
     methods: Option<Vec<String>>,
     faces: Option<Vec<usize>>,
@@ -64,7 +64,7 @@ pub fn tradeoff<'py>(
         reference_faces,
         budget: Some(budget),
     };
-    let scene = scene.0.clone();
+    let scene = copied(scene)?;
     let text = long(py, move |interrupt| {
         let found = measure(&scene, &settings, |_| interrupt.check())?;
         Ok(serde_json::to_string(&found))

@@ -296,6 +296,23 @@ def test_a_wrong_cotangent_is_an_input_error(on, coupled):
         )
 
 
+def test_a_batch_of_one_fails_as_batches_do(on, coupled):
+    sim = bridge_scenes.locking()
+    # The motion of time has its joint elsewhere then.
+    late = on.bridge.initial_state(sim)._replace(step=20)
+    for run, given in (
+        (lambda u: on.bridge.rollout(coupled.sim, u), np.full((4, 1), 1e300)),
+        (lambda u: on.bridge.step(sim, late, u), np.zeros(1)),
+    ):
+        with pytest.raises(hg.Error) as alone:
+            run(on.array(given))
+        assert not isinstance(alone.value, hg.BatchError)
+        for lead in ((1,), (1, 1), (2,)):
+            with pytest.raises(hg.BatchError, match="member 0") as batch:
+                run(on.array(np.tile(given, (*lead, *(1,) * given.ndim))))
+            assert str(batch.value.errors[0]) == str(alone.value)
+
+
 def test_whole_numbers_and_arrays_are_numbers(on, coupled):
     right = on.numbers(on.bridge.rollout(coupled.sim, on.array(np.ones((4, 1)))).q)
     for given in (np.ones((4, 1)), [[1]] * 4, on.whole([[1]] * 4)):

@@ -1,5 +1,7 @@
 """Optimal control from Python: the numbers of the Rust side, shapes, callbacks, and errors in Python's words."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,26 @@ def test_tracking_is_a_policy(sim):
     np.testing.assert_allclose(other.vjp(positions=seed).initial_v, tracked.vjp(positions=seed).initial_v, rtol=1e-12)
 
 
+def test_tracking_travels(sim):
+    """By itself, with a simulator that it controls, and with a rollout."""
+    plan = hg.optimize.ilqr(sim, TERMS, knots=20, hold=3, lower=-20, upper=[20.0] * 5 + [np.inf])
+    again = pickle.loads(pickle.dumps(plan.tracking))
+    bar = np.linspace(-1.0, 1.0, 6)
+    for time in (-0.1, 0.37, 1.19, 9.0):
+        seen = hg.Observation(0, time, plan.rollout.q[7], plan.rollout.v[7] + 0.01)
+        assert np.array_equal(again.act(seen), plan.tracking.act(seen))
+        for found, right in zip(again.act_vjp(seen, bar), plan.tracking.act_vjp(seen, bar)):
+            assert np.array_equal(found, right)
+    held = sim.with_policy(plan.tracking)
+    start = {"v": [0.1, 0.0, -0.1, 0.2, 0.0, 0.3]}
+    rollout, other = held.rollout(steps=20, **start), pickle.loads(pickle.dumps(held)).rollout(steps=20, **start)
+    assert np.array_equal(other.q, rollout.q)
+    assert np.array_equal(pickle.loads(pickle.dumps(rollout)).q, rollout.q)
+    for wrong in (bar[:2], np.zeros(9)):
+        with pytest.raises(hg.InputError, match="control_bar.*must be 6 numbers"):
+            plan.tracking.act_vjp(seen, wrong)
+
+
 def test_custom_is_what_is_built_in(sim):
     """Weights on the velocity and the controls, written in Python."""
 
@@ -91,6 +113,19 @@ def test_custom_is_what_is_built_in(sim):
     assert mine.cost == pytest.approx(theirs.cost, rel=1e-12)
     without = hg.optimize.ilqr(sim, [cost.effort(0.01), cost.custom(lambda p: own(p)[:3])], knots=5, iterations=5)
     assert without.cost <= without.costs[0]
+
+
+def test_what_a_cost_raises_ends_the_search(sim):
+    """Where the start was fine too: it isn't taken for a trial that fails."""
+
+    def own(point):
+        if point.q[0] > 0.01:
+            raise NameError("I forgot")
+        return 0.0, None, None
+
+    terms = [cost.position("hull", (0.3, 0, 0), 100.0), cost.effort(1e-6), cost.custom(own)]
+    with pytest.raises(NameError, match="I forgot"):
+        hg.optimize.ilqr(sim, terms, knots=15)
 
 
 def test_moving_targets(sim):
@@ -139,13 +174,20 @@ def test_errors(sim):
     refused("last term", cost.position("hull", (0, 0, np.e), 1, last=True), cost.velocity([0.0], 1, last=True))
     refused("iterations", iterations=0)
     refused("previous", previous=[1.0])
+    refused("shift: got 3; must be 0 unless the guess is a plan", shift=3)
+    refused("shift: got 3; must be 0 unless the guess is a plan", shift=3, guess=np.zeros((5, 6)))
     refused("must be a tuple", cost.custom(lambda p: 1.0))
     refused(r"xx.*\(12, 12\)", cost.custom(lambda p: (1.0, None, None, np.eye(3), None, None)))
     refused("by zero", cost.custom(lambda p: 1 / 0), error=ZeroDivisionError)
     with pytest.raises(hg.InputError, match="callable"):
         cost.custom(3)
+    with pytest.raises(hg.InputError, match=r"effort: times: got \[0, 1\]; give a `target`"):
+        cost.effort(1.0, times=[0, 1])
     with pytest.raises(hg.InputError, match="every"):
         hg.optimize.Mpc(sim, TERMS, knots=5, every=9)
+    with pytest.raises(hg.InputError, match="^mpc: previous: "):
+        hg.optimize.Mpc(sim, TERMS, knots=5, previous="x")
+    refused("^ilqr: previous: ", previous="x")
     mpc = hg.optimize.Mpc(sim, TERMS, knots=5)
     with pytest.raises(hg.InputError, match="control: q"):
         mpc.control(0.0, np.zeros(3), np.zeros(6))

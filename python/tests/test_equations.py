@@ -218,6 +218,27 @@ def test_sites_are_observed_with_gradients(wet):
     assert abs(np.sum(gradient * along) - slope) < 1e-6 * abs(slope)
 
 
+def test_rotations_have_tangents_of_one_shape(wet):
+    """Those of bodies and of sites: turns about the world's axes, as tangents and as cotangents."""
+    random = np.random.default_rng(7)
+    u = random.normal(size=(5, wet.control_size))
+    rollout, along = wet.rollout(u), random.normal(size=u.shape)
+    made = rollout.jvp(controls=along, observables=["rotations", "site_rotations"])
+    assert np.array_equal(made.observables["rotations"], made.rotations)
+    for name, count in (("rotations", 2), ("site_rotations", 1)):
+        turned = made.observables[name]
+        assert turned.shape == (6, count, 3) and np.abs(turned).max() > 0
+        bar = random.normal(size=turned.shape)
+        gradient = rollout.vjp(observables={name: bar}).controls
+        assert np.sum(gradient * along) == pytest.approx(np.sum(bar * turned), rel=1e-9)
+        with pytest.raises(hg.InputError, match=rf"{name}.*must have the shape \(6, {count}, 3\)"):
+            rollout.vjp(observables={name: rollout.observe(name)})
+        assert rollout.jacobian(controls=True, of=[name])[name].shape == (6, count, 3, u.size)
+    bar = random.normal(size=(6, 2, 3))
+    one, other = rollout.vjp(rotations=bar), rollout.vjp(observables={"rotations": bar})
+    assert np.allclose(one.controls, other.controls, rtol=1e-12, atol=1e-15)
+
+
 def test_what_does_not_fit_is_told(wet):
     with pytest.raises(hg.InputError, match="quaternion"):
         wet.equations(2.0 * wet.initial_q + 1.0)

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -214,6 +216,24 @@ def test_other_threads_run_meanwhile(sim):
     assert count > 10
 
 
+def test_a_scene_is_free_while_something_is_made_of_it():
+    """Other threads may change it."""
+    scene, done = hg.Scene(), []
+    scene.add(hg.Body(hg.sphere(1.0), name="ball", density=1000.0))
+
+    def make():
+        done.append(hg.Simulator(scene, fidelity="full", faces=2000).body_names)
+
+    thread, count = threading.Thread(target=make), 0
+    thread.start()
+    while thread.is_alive():
+        scene.set_initial()
+        count += 1
+        time.sleep(0.001)
+    thread.join()
+    assert done == [["ball"]] and count > 5
+
+
 def test_counts_that_are_none(sim):
     for name, call in (
         ("steps", lambda: sim.rollout(steps=-1)),
@@ -225,3 +245,41 @@ def test_counts_that_are_none(sim):
     ):
         with pytest.raises(hg.InputError, match=f"^{name}: .*whole number that isn't negative"):
             call()
+
+
+def test_more_steps_than_there_can_be():
+    """In a process of its own, which ends where they aren't refused before memory is taken for them."""
+    program = """
+import hydrograd as hg
+from hydrograd import cost
+
+scene = hg.Scene()
+scene.add(hg.Body(hg.sphere(0.1), name="ball", density=1000.0, actuated=True))
+driven = hg.Simulator(scene, 0.01, fidelity="isolated")
+still = hg.Scene()
+still.add(hg.Body(hg.sphere(0.1), density=1000.0))
+still = hg.Simulator(still, 0.01, fidelity="isolated")
+goal = hg.objective.final_velocity(0, 0.0)
+terms = [cost.effort(1.0)]
+for sim in (driven, still):
+    for steps in (10**12, 2**61):
+        for call in (
+            lambda: sim.rollout(steps=steps),
+            lambda: sim.gradient_in_parts(goal, steps=steps),
+            lambda: hg.optimize.ilqr(sim, terms, knots=steps),
+            lambda: hg.optimize.ilqr(sim, terms, knots=steps, hold=steps),
+            lambda: hg.optimize.Mpc(sim, terms, knots=steps),
+        ):
+            try:
+                call()
+                raise SystemExit("it ran")
+            except hg.Error as error:
+                assert "steps" in str(error) and "must be at most" in str(error), error
+try:
+    still.gradient_in_parts(goal, [[]], steps=3)
+    raise SystemExit("it ran")
+except hg.InputError as error:
+    assert str(error).startswith("gradient_in_parts: steps: got 3; must be 1"), error
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,6 +1,8 @@
 """Parameters from recordings."""
 
+import gc
 import math
+import weakref
 
 import numpy as np
 import pytest
@@ -60,6 +62,37 @@ def test_what_lies_far_off_is_forgiven(coin):
     )
     off = [abs(f.values["coin.mass"] / MASS - 1.0) for f in (plain, robust)]
     assert off[1] < 0.02 and off[1] < 0.2 * off[0]
+
+
+def test_an_experiment_holds_its_controller():
+    """Also where nobody else does; and what holds its experiment is collected with it."""
+
+    class Push:
+        def act(self, seen):
+            return np.full(1, 0.2)
+
+        def act_vjp(self, seen, control_bar):
+            return None, None
+
+    scene = hg.Scene(time_step=0.01)
+    rail = hg.prismatic((1, 0, 0))
+    scene.add(hg.Body(hg.sphere(0.05, faces=80), name="ball", mass=0.6, joint=rail, actuated=True))
+    bare = hg.Simulator(scene, fidelity="isolated")
+    seen = bare.rollout(np.full((STEPS, 1), 0.2)).positions[:, 0, 0]
+    run = hg.optimize.Experiment("push", bare.with_policy(Push()), steps=STEPS)
+    gc.collect()
+    run.saw("positions", "ball.position_x", seen, deviation=1e-4)
+    found = hg.optimize.identify([run], [hg.optimize.Unknown("ball.mass", positive=True, start=0.5)])
+    assert found.values["ball.mass"] == pytest.approx(0.6, rel=1e-5)
+
+    def cycle():
+        push = Push()
+        push.run = hg.optimize.Experiment("push", bare.with_policy(push), steps=STEPS)
+        return weakref.ref(push)
+
+    gone = [cycle() for _ in range(3)]
+    gc.collect()
+    assert [at() for at in gone] == [None] * 3
 
 
 def test_functions_of_observables(coin):

@@ -156,6 +156,20 @@ def test_jit_without_controls():
     assert np.array_equal(made.q[1], sim.rollout(steps=5).q)
 
 
+def test_runs_of_nothing_differ_by_their_lengths():
+    """Without controls all that they are given is the same: each backward pass finds its own forward pass."""
+    sim = bridge_scenes.passive()
+
+    def run(steps):
+        return lambda v: jnp.sum(hj.rollout(sim, jnp.zeros((steps, 0)), v=v).positions ** 2)
+
+    v = jnp.asarray(sim.initial_v + 0.1)
+    (_, back5), (_, back8) = jax.vjp(run(5), v), jax.vjp(run(8), v)
+    found = back5(jnp.ones(()))[0], back8(jnp.ones(()))[0]
+    for steps, bar in zip((5, 8), found):
+        assert np.array_equal(bar, jax.grad(run(steps))(v))
+
+
 def test_jit_is_compiled_once(coupled):
     traced = []
 

@@ -249,3 +249,42 @@ mpc.set_model(sim.with_parameters({"ball.mass": 0.7}))
 assert mpc.model is not sim and mpc.control(0.0, q, v).shape == (6,) and len(mpc.replans) == 1
 """,
     )
+
+
+def test_what_ends_a_batch_ends_its_members():
+    """By Ctrl-C, with members that run and members that wait, and by an exception of one: nothing goes on, and the process ends."""
+    runs(
+        """
+signal.signal(signal.SIGINT, signal.default_int_handler)
+physics = _bridge.physics_of("slow", sim.with_policy(Slow()), {"ball.mass": None})
+masses, none = np.linspace(0.5, 0.9, 8)[:, None], np.zeros((8, 0))
+q, v = np.tile(sim.initial_q, (8, 1)), np.tile(sim.initial_v, (8, 1))
+started = time.perf_counter()
+threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    _bridge.roll(physics, np.zeros((8, 2000, 6)), q, v, masses, none)
+    raise SystemExit("it ran")
+except KeyboardInterrupt:
+    assert time.perf_counter() - started < 5.0
+
+ended = []
+
+def work(b, progress):
+    if b == 0:
+        raise ZeroDivisionError
+    try:
+        while True:
+            progress(0, 1)
+            time.sleep(0.01)
+    finally:
+        ended.append(b)
+
+try:
+    _bridge.each(work, range(50), stops=True)
+    raise SystemExit("it ran")
+except ZeroDivisionError:
+    pass
+_bridge._pool(os.getpid()).shutdown()
+assert len(ended) < 49 and time.perf_counter() - started < 15.0
+""",
+    )

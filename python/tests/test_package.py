@@ -2,6 +2,7 @@
 
 import ast
 import dataclasses
+import importlib
 import inspect
 import json
 import pathlib
@@ -41,6 +42,13 @@ def test_every_name_has_a_stub_and_every_stub_a_name():
         value = getattr(_hydrograd, name)
         if inspect.isclass(value) and not issubclass(value, Exception):
             assert public(members) == public(vars(value)), name
+
+
+def test_classes_say_where_they_are():
+    for name in public(dir(_hydrograd)):
+        value = getattr(_hydrograd, name)
+        if inspect.isclass(value):
+            assert getattr(importlib.import_module(value.__module__), name) is value, name
 
 
 def test_the_command_runs_and_says_how_it_ended():

@@ -275,6 +275,9 @@ def test_choices_that_can_not_be_are_refused():
         ({"links": {"hand": {"shape": "round"}}}, "round"),
         ({"links": {"foot": {"mass": 1.0}}}, "foot"),
         ({"start": {"arm_elbow": 9.0}}, "arm_elbow"),
+        ({"start": hg.Drag(quadratic=1.0)}, "expected a map"),
+        ({"drga": hg.Drag(quadratic=1.0)}, "drga"),
+        ({"urdf": "other.urdf"}, "urdf.*other.urdf.*first argument"),
     ]:
         with pytest.raises(hg.InputError, match=words):
             hg.Scene.from_urdf(path, **choices)

@@ -2,6 +2,7 @@
 
 import pickle
 
+import bridge_scenes
 import numpy as np
 import pytest
 
@@ -161,6 +162,30 @@ def test_meshes_from_arrays_objects_and_files(tmp_path):
     assert np.allclose(*matrices, rtol=1e-9, atol=1e-12)
 
 
+def test_files_of_meshes_are_found_from_anywhere(tmp_path, monkeypatch):
+    vertices, faces = hg.box(0.1, 0.2, 0.3, faces=80).triangles()
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    for folder in ("scenes", "elsewhere"):
+        (tmp_path / folder).mkdir()
+    file = tmp_path / "scenes/box.obj"
+    file.write_text("\n".join(lines))
+    body = '[[bodies]]\nname = "box"\ndensity = 1000.0\nshape = { kind = "mesh", path = "box.obj" }\n'
+    (tmp_path / "scenes/a.toml").write_text(f"time_step = 0.01\nsteps = 2\n[fluid]\ndensity = 0.0\n{body}")
+    monkeypatch.chdir(tmp_path)
+    scene, shape = hg.Scene.load("scenes/a.toml"), hg.mesh("scenes/box.obj")
+    sim = hg.Simulator(scene)
+    monkeypatch.chdir("elsewhere")
+    text = scene.to_toml()
+    for again in (pickle.loads(pickle.dumps(scene)), hg.Scene.from_toml(text), hg.Scene.from_toml(text, "nowhere")):
+        assert again == scene
+    assert pickle.loads(pickle.dumps(sim)).rollout().steps == 2
+    assert np.isclose(shape.volume, 0.006)
+    # What a simulator was made of it knows, whatever became of the file.
+    file.unlink()
+    assert len(sim.rollout().to_dict()["time"]) == 3
+
+
 def test_a_state_of_another_simulator_keeps_its_velocity(sim, controls):
     """Whatever integrators step in: most of them in momentum, which is another where the masses are."""
 
@@ -224,3 +249,19 @@ def test_no_configurations_have_no_tangents(sim):
     equations = sim.equations(none)
     assert equations.q.shape == none.shape and equations.mass_matrix().shape == (0, sim.v_size, sim.v_size)
     assert sim.linearise(none)[0].shape == (0, 2 * sim.v_size, 2 * sim.v_size)
+
+
+def test_states_have_driven_joints_where_their_motion_has_them():
+    sim = bridge_scenes.locking()
+    rollout = sim.rollout(steps=3)
+    state = sim.state(step=3)
+    assert state.q[1] == pytest.approx(rollout.q[3, 1], rel=1e-12)
+    assert state.v[1] == pytest.approx(0.05 * np.cos(0.06), rel=1e-12)
+    given = sim.state(q=rollout.q[3], v=[rollout.v[3, 0], 0.0], step=3)
+    np.testing.assert_allclose(given.v, rollout.v[3], rtol=1e-12)
+    for one in (state, given):
+        np.testing.assert_allclose(one.v, sim.rollout(steps=0, state=one).v[0], rtol=1e-9)
+    for found, right in zip(sim.linearise(step=3), sim.linearise(state.q, state.v, step=3)):
+        assert np.array_equal(found, right)
+    with pytest.raises(hg.InputError, match="other.*driven"):
+        sim.state(q=sim.initial_q + [0.0, 0.01], step=3)

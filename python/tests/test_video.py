@@ -13,7 +13,7 @@ import pytest
 
 import hydrograd as hg
 from hydrograd._viewer import video as videos
-from hydrograd._viewer.encode import KINDS
+from hydrograd._viewer.encode import KINDS, Encoded
 
 if os.environ.get("HYDROGRAD_REQUIRE_BROWSER") != "1":
     pytest.importorskip("av")
@@ -277,3 +277,11 @@ def test_the_command_says_what_is_wrong_before_it_runs(tmp_path, arguments, envi
 
 def test_every_kind_is_tested():
     assert set(KINDS) == {".mp4", ".webm"}
+
+
+def test_an_encoder_that_is_not_there_leaves_nothing(tmp_path, monkeypatch):
+    for form, codec in (("mp4", "nothing"), ("nothing", "libx264")):
+        monkeypatch.setitem(KINDS, ".mp4", (form, codec, {"movflags": "+faststart"}))
+        with pytest.raises(hg.UnsupportedError, match=f"{form} by {codec} is not available"):
+            Encoded(tmp_path / "run.mp4", SIZE, 10.0).__enter__()
+        assert list(tmp_path.iterdir()) == []

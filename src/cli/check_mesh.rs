@@ -10,7 +10,7 @@ use crate::Result;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The mesh: .obj, .stl or .ply.
+    /// The mesh: .obj, .stl, .ply or .dae.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Factor from the file's units to metres (0.001 for millimetres).

@@ -1,4 +1,4 @@
-//! `hydrograd inspect`: what a robot in a URDF file comes to.
+//! `hydrograd inspect`: what a robot in a URDF or MJCF file comes to.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::{Error, Result};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The robot.
+    /// The robot (.urdf, .mjcf, .xml).
     #[arg(value_name = "ROBOT.urdf")]
     file: PathBuf,
     #[command(flatten)]

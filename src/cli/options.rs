@@ -101,9 +101,9 @@ impl Adapter {
     }
 }
 
-/// How a URDF file is read; a scene file says this in its [[robot]].
+/// How a robot's file, URDF or MJCF, is read; a scene file says this in its [[robot]].
 #[derive(Clone, Debug, Default, Args)]
-#[command(next_help_heading = "Of a URDF file")]
+#[command(next_help_heading = "Of a robot's file (URDF or MJCF)")]
 pub(super) struct RobotArguments {
     /// Folder that holds packages of meshes; may be given several times. Those of ROS_PACKAGE_PATH, the file's own and all above it come after.
     #[arg(long, value_name = "FOLDER")]
@@ -147,7 +147,7 @@ impl RobotArguments {
         if self.robot() != Robot::default() {
             return Err(Error::input(
                 path.display().to_string(),
-                "choices for a URDF file",
+                "choices for a robot's file",
                 "a scene file says them in its [[robot]] (`package_path`, `base`, `shape`, `mimic`, `bad_meshes`, `limits`)",
             ));
         }
@@ -156,7 +156,7 @@ impl RobotArguments {
 }
 
 /// Whether a file is a robot, by its name.
-fn is_urdf(path: &Path) -> bool {
+pub(super) fn is_urdf(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     ["urdf", "mjcf", "xml"]
         .iter()
@@ -166,7 +166,7 @@ fn is_urdf(path: &Path) -> bool {
 /// A scene, and how it is simulated.
 #[derive(Debug, Args)]
 pub(super) struct Simulation {
-    /// The scene file, or a robot, which is then alone in still fresh water.
+    /// The scene file, or a robot (.urdf, .mjcf, .xml), which is then alone in still fresh water.
     #[arg(value_name = "SCENE.toml|ROBOT.urdf")]
     scene: PathBuf,
     #[command(flatten)]
@@ -179,7 +179,7 @@ pub(super) struct Simulation {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     time_step: Option<f64>,
-    /// How a step is taken [default: rk4, momentum-euler with contact; velocity-euler with the preset paper].
+    /// How a step is taken [default: rk4; momentum-euler with contact, limits of joints, lubrication, joints that damp or rub, and servos; velocity-euler with the preset paper].
     #[arg(long, value_parser = choice::<Integrator>())]
     integrator: Option<Integrator>,
 }

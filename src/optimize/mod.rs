@@ -37,7 +37,7 @@ pub use identify::{
     Profile, Recorded, SeriesFit, Unknown, WeakDirection, identify,
 };
 pub use ilqr::{
-    Guess, IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes, Plan, Problem, Tracking, ilqr,
+    Guess, IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes, Plan, Problem, Track, Tracking, ilqr,
 };
 pub use mpc::{Mpc, MpcProgress, MpcRun, MpcSettings, Replan};
 pub use smoothed::{Estimate, Smoothed, Smoothing, smoothed};

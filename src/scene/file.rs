@@ -18,7 +18,7 @@ use crate::{Error, Result};
 const TEXT: &str = "scene text";
 
 impl Scene {
-    /// Reads a scene file. Paths of meshes are taken relative to the file's folder.
+    /// Reads a scene file. Paths of meshes are taken relative to the file's folder, and are absolute in the scene.
     ///
     /// What the scene says is checked by [`Scene::validate`], not here.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
@@ -29,7 +29,7 @@ impl Scene {
         with_robots(scene, folder)
     }
 
-    /// A scene from TOML text. Paths of meshes are taken relative to `folder`.
+    /// A scene from TOML text. Paths of meshes are taken relative to `folder`, and are absolute in the scene.
     pub fn from_toml(text: &str, folder: impl AsRef<Path>) -> Result<Self> {
         let name = Path::new(TEXT);
         let folder = folder.as_ref();
@@ -159,8 +159,12 @@ fn parse(text: &str, folder: &Path, file: &Path) -> std::result::Result<Scene, S
         body.origin = origin(document.get_ref(), (b, body), file, line);
         let pieces = body.collision.iter_mut().map(|piece| &mut piece.shape);
         for shape in body.shape.iter_mut().chain(pieces) {
-            if let Shape::Mesh { path, .. } = shape {
-                *path = folder.join(&*path);
+            if let Shape::Mesh { path, .. } = shape
+                && !path.as_os_str().is_empty()
+            {
+                // What it is doesn't depend on the folder in which the program goes on.
+                let joined = folder.join(&*path);
+                *path = std::path::absolute(&joined).unwrap_or(joined);
             }
         }
     }

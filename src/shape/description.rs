@@ -67,7 +67,7 @@ pub enum Shape {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         faces: Option<usize>,
     },
-    /// A closed triangle mesh in a file (OBJ, STL, PLY).
+    /// A closed triangle mesh in a file (OBJ, STL, PLY; DAE with the feature `urdf`).
     Mesh {
         /// The file; relative to the scene file.
         path: PathBuf,
@@ -137,7 +137,7 @@ impl Shape {
         }
     }
 
-    /// A closed triangle mesh in an OBJ, STL or PLY file, in metres.
+    /// A closed triangle mesh in an OBJ, STL, PLY or DAE file, in metres.
     pub fn mesh(path: impl Into<PathBuf>) -> Self {
         Self::Mesh {
             path: path.into(),

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Digest of version, scene (but for its number of steps) and choices.
+    /// Digest of version, scene (but for its number of steps, and with what is in the files of meshes in place of their paths) and choices.
     key: String,
     /// Steps made.
     step: usize,
@@ -30,7 +30,7 @@ impl Simulator {
     /// What goes with a state of this simulator.
     ///
     /// # Errors
-    /// A scene that can't be written as TOML.
+    /// A scene that can't be written as TOML, or the file of a mesh that can't be read.
     pub fn checkpoint(&self, state: &State) -> Result<Checkpoint> {
         Ok(Checkpoint {
             key: self.key()?,
@@ -86,6 +86,7 @@ impl Simulator {
     fn key(&self) -> Result<String> {
         let mut scene = Scene::clone(&self.scene);
         scene.steps = 0;
+        self.mesh_files.put_into(&mut scene)?;
         let mut digest = Sha256::new();
         digest.update(env!("CARGO_PKG_VERSION"));
         digest.update(scene.to_toml()?);

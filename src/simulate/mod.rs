@@ -21,6 +21,7 @@ mod jacobians;
 mod knots;
 mod lines;
 mod loads;
+mod mesh_files;
 pub mod objective;
 pub mod observable;
 mod part;

@@ -208,7 +208,7 @@ impl Simulator {
     }
 
     /// Refuses too many steps; gives their number.
-    fn check_steps(&self, steps: usize) -> Result<usize> {
+    pub(crate) fn check_steps(&self, steps: usize) -> Result<usize> {
         if steps > MOST_STEPS {
             return Err(Error::input(
                 "steps",

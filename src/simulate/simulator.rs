@@ -1,5 +1,6 @@
 //! The simulator: a scene made ready to run.
 
+use super::mesh_files::MeshFiles;
 use super::{BackendReport, Discretisation, ErrorEstimate, Fidelity, Policy, Settings};
 use crate::adjoint::lie::{Mat3, Mat6, Pose};
 use crate::assembly::{self, Assembled, Choices};
@@ -20,6 +21,7 @@ pub struct Simulator {
     pub(super) scene: Arc<Scene>,
     pub(super) assembled: Arc<Assembled>,
     pub(super) choices: Choices,
+    pub(super) mesh_files: Arc<MeshFiles>,
 }
 
 /// Added mass of all bodies in the water at one configuration.
@@ -80,6 +82,7 @@ impl Simulator {
             scene: Arc::new(scene.clone()),
             assembled: Arc::new(assembled),
             choices,
+            mesh_files: Arc::new(MeshFiles::of(scene)),
         };
         out.initial()?;
         Ok(out)

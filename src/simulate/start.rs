@@ -200,6 +200,22 @@ impl Simulator {
         )
     }
 
+    /// Coordinates and velocity after `step` steps: those given, else those of the start; of joints that a motion drives what it says then, and no velocity of locked ones.
+    /// [`Simulator::state`] is at the state there.
+    ///
+    /// # Errors
+    /// As [`Simulator::state`], of the numbers that are given.
+    pub fn placed(
+        &self,
+        step: usize,
+        q: Option<&DVector<f64>>,
+        v: Option<&DVector<f64>>,
+    ) -> Result<(DVector<f64>, DVector<f64>)> {
+        let (q0, v0) = self.start();
+        let (q0, v0) = self.driven(q0, v0, step as f64 * self.choices.time_step);
+        self.check_start(step, q.unwrap_or(&q0), v.unwrap_or(&v0))
+    }
+
     /// The integrator's state at coordinates `q` and generalised velocity `v` after `step` steps: where
     /// [`Simulator::rollout_from`] may begin. Of a joint that a motion drives, both are what the motion says then: 0, or that.
     ///

@@ -129,7 +129,7 @@ fn bad_scenes_are_told_with_code_1() {
     fails(
         &["added-mass", "notes.txt"],
         1,
-        &["notes.txt", ".toml", ".obj"],
+        &["notes.txt", ".toml", ".mjcf", ".obj", ".dae"],
     );
     let taken = file(&folder, "taken", "");
     fails(
@@ -447,6 +447,16 @@ fn added_mass_of_scenes_and_meshes() {
     assert!(alone["warnings"].to_string().contains("floor"));
 
     let folder = tempfile::tempdir().unwrap();
+    // A robot by any of the names that other commands know; half the water that a sphere displaces.
+    let pod = "<mujoco model=\"pod\"><worldbody><body name=\"pod\"><freejoint/><geom type=\"sphere\" size=\"0.1\" density=\"1000\"/></body></worldbody></mujoco>";
+    for name in ["pod.xml", "pod.mjcf"] {
+        let robot = file(&folder, name, pod);
+        let report = json(&["added-mass", &robot, "--fidelity", "isolated"]);
+        assert_eq!(report["bodies"], serde_json::json!(["pod"]));
+        let half = 0.5 * 998.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+        let found = report["added_mass"][0][0].as_f64().unwrap();
+        assert!((found / half - 1.0).abs() < 0.05, "{found} for {half}");
+    }
     let good = file(&folder, "corner.obj", TETRAHEDRON);
     let report = json(&["added-mass", &good]);
     assert_eq!(report["bodies"], serde_json::json!(["corner"]));

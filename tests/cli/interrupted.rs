@@ -1,7 +1,7 @@
 //! Runs that end before their time: what they computed is kept, and gone on with to the bit.
 
 use crate::support::command::{command, fails, hydrograd, json, scene};
-use crate::support::says;
+use crate::support::{root, says};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -109,6 +109,28 @@ fn a_run_goes_on_to_the_bit() {
         ];
         fails(&arguments, 1, &["other.json", said]);
     }
+}
+
+/// A mesh is what stands in its file, by whatever path that is found.
+#[test]
+fn a_run_goes_on_with_the_same_mesh_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mesh = at("cube.obj");
+    std::fs::copy(root().join("tests/fuzz/corpus/mesh/cube.obj"), &mesh).unwrap();
+    std::fs::create_dir(at("sub")).unwrap();
+    let text = "time_step = 0.01\nsteps = 3\n[fluid]\ndensity = 0.0\n[[bodies]]\nname = \"cube\"\ndensity = 1000.0\n\
+                shape = { kind = \"mesh\", path = \"cube.obj\" }\n";
+    std::fs::write(at("scene.toml"), text).unwrap();
+    let (scene, same) = (words(&at("scene.toml")), words(&at("sub/../scene.toml")));
+    let (out, stopped) = (words(&at("out")), words(&at("out/trajectory.json")));
+    json(&["run", &scene, "--out", &out]);
+    let late = json(&["run", &same, "--steps", "5", "--resume", &stopped]);
+    assert_eq!(late["steps"], 2);
+    let whole = std::fs::read_to_string(&mesh).unwrap();
+    std::fs::write(&mesh, whole + "# edited\n").unwrap();
+    let arguments = ["run", &scene, "--steps", "5", "--resume", &stopped];
+    fails(&arguments, 1, &["another scene"]);
 }
 
 /// Two balls that meet where surfaces may not.

@@ -59,6 +59,15 @@ fn where_a_motion_has_a_joint_no_other_can() {
     let same = simulator.state(7, &q(at(0.07)), &v(0.0)).unwrap();
     assert!((free.q[0] - at(0.07)).abs() < 1e-15);
     assert!((&free.y - &same.y).amax() < 1e-12);
+    let (placed_q, placed_v) = simulator.placed(7, None, Some(&v(0.0))).unwrap();
+    assert!((placed_q[0] - at(0.07)).abs() < 1e-15 && placed_q[1] == simulator.start().0[1]);
+    assert!((placed_v[0] - 0.6 * (0.21 + PHASE).cos()).abs() < 1e-14 && placed_v[1] == 0.1);
+    assert_eq!(
+        simulator.state(7, &placed_q, &placed_v).unwrap().q,
+        placed_q
+    );
+    let error = simulator.placed(7, Some(&q(at(0.0))), None).unwrap_err();
+    says(error, &["rail", "driven", "t = 0.07 s"]);
     simulator.set_start(q(0.0), v(0.0)).unwrap();
     assert!((simulator.start().0[0] - at(0.0)).abs() < 1e-15);
     assert!((simulator.start().1[0] - 0.6 * PHASE.cos()).abs() < 1e-15);

@@ -2,7 +2,7 @@
 //!
 //! `HYDROGRAD_LONG_STEPS=1000000 cargo test --release --test dynamics parts -- --nocapture` for a long one.
 
-use crate::support::{INTEGRATORS, example, simulator};
+use crate::support::{INTEGRATORS, example, says, simulator};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{BodyId, Drag, DragPart};
 use hydrograd::simulate::{Checkpoints, Partwise};
@@ -103,6 +103,26 @@ fn checkpoints_fit_what_they_are_given() {
     };
     let error = simulator.gradient_in_parts(&controls, &goal(), kept, stop);
     assert!(matches!(error, Err(Error::Stopped { .. })));
+}
+
+/// Before anything of their size is made.
+#[test]
+fn more_steps_than_any_run_takes_are_refused() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.add(Body::new(Shape::sphere(0.1).faces(80)).density(1000.0));
+    let still = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    // More than a rollout keeps: for runs in parts, and so not cut.
+    let long = Controls::none(&still, 6_000_000).unwrap();
+    assert_eq!(long.steps(), 6_000_000);
+    let error = still.rollout(&long).err().expect("an error");
+    says(error, &["steps", "at most 5000000", "in parts"]);
+    for steps in [2_000_000_000, usize::MAX] {
+        let count = steps.to_string();
+        let words = ["controls: steps", count.as_str(), "at most 1000000000"];
+        says(Controls::none(&still, steps).unwrap_err(), &words);
+        let empty = DMatrix::zeros(0, steps);
+        says(Controls::from_matrix(&still, empty).unwrap_err(), &words);
+    }
 }
 
 const STEPS: &str = "HYDROGRAD_LONG_STEPS";

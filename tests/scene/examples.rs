@@ -310,6 +310,13 @@ fn mesh_paths_are_relative_to_the_scene_file() {
     let scene = Scene::load(&path).unwrap();
     let hull = Shape::mesh(folder.path().join("parts/hull.obj"));
     assert_eq!(scene.bodies[0].shape, Some(hull));
+    // From a relative folder too they don't depend on where the program goes on.
+    let scene = Scene::from_toml(text, "some").unwrap();
+    let here = std::env::current_dir().unwrap();
+    let hull = Shape::mesh(here.join("some/parts/hull.obj"));
+    assert_eq!(scene.bodies[0].shape, Some(hull));
+    let again = Scene::from_toml(&scene.to_toml().unwrap(), "elsewhere").unwrap();
+    assert_eq!(again, scene);
 }
 
 #[test]

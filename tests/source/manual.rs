@@ -26,6 +26,7 @@ fn the_page_on_the_command_line_is_what_the_program_says() {
         "added-mass",
         "gradcheck",
         "tradeoff",
+        "inspect",
         "check-mesh",
         "gpu-info",
     ] {

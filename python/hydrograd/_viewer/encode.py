@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import io
 import os
@@ -12,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from hydrograd._hydrograd import FileError
+from hydrograd._hydrograd import FileError, UnsupportedError
 
 # By its ending: the container, the encoder, and its settings for pictures that nobody tells from their originals.
 KINDS: dict[str, tuple[str, str, dict[str, str]]] = {
@@ -70,20 +71,38 @@ class Encoded:
         os.close(handle)
         self.part = Path(name)
         own = {name: options[name] for name in options if name == "movflags"}
-        self.container = self.av.open(name, "w", format=form, options=own)
-        self.stream = self.container.add_stream(codec, rate=self.rate, options={k: v for k, v in options.items() if k not in own})
-        self.stream.width, self.stream.height = self.size
-        self.stream.pix_fmt = "yuv420p"
-        if "b" in options:
-            # The quality alone decides.
-            self.stream.bit_rate = 0
+        try:
+            self.container = self.av.open(name, "w", format=form, options=own)
+            self.stream = self.container.add_stream(codec, rate=self.rate, options={k: v for k, v in options.items() if k not in own})
+            self.stream.width, self.stream.height = self.size
+            self.stream.pix_fmt = "yuv420p"
+            if "b" in options:
+                # The quality alone decides.
+                self.stream.bit_rate = 0
+        except BaseException as error:
+            # Whoever fails to enter isn't exited.
+            with contextlib.suppress(Exception):
+                self._drop()
+            if not isinstance(error, Exception):
+                raise
+            raise UnsupportedError(
+                f"record: a {form} by {codec} is not available: PyAV says {error}; install a PyAV that has the encoder, or record frames "
+                "into a folder"
+            ) from error
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         # Not finished: nothing is left of it.
         if self.part is not None:
-            self.container.close()
-            self.part.unlink(missing_ok=True)
+            self._drop()
+
+    def _drop(self) -> None:
+        try:
+            if self.container is not None:
+                self.container.close()
+        finally:
+            if self.part is not None:
+                self.part.unlink(missing_ok=True)
 
     def add(self, png: bytes) -> None:
         """One more picture."""

@@ -10,7 +10,7 @@ use serde::Serialize;
 mod format;
 
 use super::exit::Exit;
-use super::options::{RobotArguments, Water};
+use super::options::{RobotArguments, Water, is_urdf};
 use super::output::{ChoicesReport, Output, note, print_text, write_warnings};
 use crate::scene::{Body, Fluid, Scene, Shape};
 use crate::simulate::ErrorEstimate;
@@ -42,7 +42,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct Source {
-    /// A scene (.toml) or robot (.urdf), at its start, or a mesh (.obj, .stl, .ply; metres).
+    /// A scene (.toml) or robot (.urdf, .mjcf, .xml), at its start, or a mesh (.obj, .stl, .ply, .dae; metres).
     #[arg(value_name = "SCENE.toml|ROBOT.urdf|MESH")]
     file: Option<PathBuf>,
     /// A shape by formula, lengths in m: sphere:RADIUS, ellipsoid:A,B,C (semi-axes), box:A,B,C
@@ -70,14 +70,14 @@ impl Source {
             let extension = path.extension().unwrap_or_default().to_string_lossy();
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
             match extension.to_ascii_lowercase().as_str() {
-                "toml" | "urdf" => robot.scene(path)?,
-                "obj" | "stl" | "ply" => alone(Shape::mesh(path), &stem),
+                "obj" | "stl" | "ply" | "dae" => alone(Shape::mesh(path), &stem),
+                scene if scene == "toml" || is_urdf(path) => robot.scene(path)?,
                 _ => {
                     return Err(Error::input(
                         path.display().to_string(),
                         format!("a name that ends in {extension:?}"),
-                        "give a scene (.toml), a robot (.urdf), a mesh (.obj, .stl, .ply), or a shape by --shape, \
-                     e.g. --shape sphere:0.5",
+                        "give a scene (.toml), a robot (.urdf, .mjcf, .xml), a mesh (.obj, .stl, .ply, .dae), or a shape by \
+                     --shape, e.g. --shape sphere:0.5",
                     ));
                 }
             }

@@ -67,7 +67,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
         match self.evaluate(x) {
             Ok(trial) => Ok(Some(trial)),
             // The caller's own reasons, and what its function of observables raised.
-            Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => Err(stop),
+            Err(stop) if stop.ends_search() => Err(stop),
             Err(_) => {
                 self.failures += 1;
                 Ok(None)

@@ -328,7 +328,7 @@ fn profile(misfit: &Misfit, found: &Found, change: &DVector<f64>) -> Result<Vec<
         let expected = 0.5 * (&linear.jacobian * (&to - &best.x)).norm_squared();
         let rise = match misfit.evaluate(&to) {
             Ok(found) => Some(found.cost - best.cost),
-            Err(stop @ (Error::Stopped { .. } | Error::Controller { .. })) => return Err(stop),
+            Err(stop) if stop.ends_search() => return Err(stop),
             Err(_) => None,
         };
         Ok(Profile {

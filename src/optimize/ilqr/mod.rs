@@ -24,11 +24,12 @@ mod tracking;
 pub use plan::{Guess, Plan};
 pub use problem::Problem;
 pub use settings::{IlqrProgress, IlqrSettings, IlqrStop, IlqrTimes};
-pub use tracking::Tracking;
+pub use tracking::{Track, Tracking};
 
 pub(super) use problem::Ready;
 
 use crate::Result;
+use crate::error::in_order;
 use crate::simulate::{Simulator, State};
 use backward::{Answer, Backward, KnotModel, backward, gradient};
 use nalgebra::DVector;
@@ -95,33 +96,38 @@ fn search(
     run: &Run,
     sweep: &Backward,
     trials: usize,
-) -> Option<(f64, Run)> {
-    let try_out = |k: usize| {
+) -> Result<Option<(f64, Run)>> {
+    let try_out = |k: usize| -> Result<Option<(f64, Run)>> {
         let part = 0.5_f64.powi(k as i32);
-        let found = ready.trial(simulator, start, run, &sweep.answers, part);
-        let expected = part * (sweep.expected[0] + part * sweep.expected[1]);
-        let falls = |found: &Run| {
-            found.cost - run.cost <= ARMIJO * expected.min(0.0) && found.cost < run.cost
+        let found = match ready.trial(simulator, start, run, &sweep.answers, part) {
+            Ok(found) => found,
+            Err(stop) if stop.ends_search() => return Err(stop),
+            Err(_) => return Ok(None),
         };
-        found.ok().filter(falls).map(|found| (part, found))
+        let expected = part * (sweep.expected[0] + part * sweep.expected[1]);
+        let falls = found.cost - run.cost <= ARMIJO * expected.min(0.0) && found.cost < run.cost;
+        Ok(falls.then_some((part, found)))
     };
     // A whole step is what most iterations take.
-    if let Some(found) = try_out(0) {
-        return Some(found);
+    if let Some(found) = try_out(0)? {
+        return Ok(Some(found));
     }
     let rest: Vec<usize> = (1..trials).collect();
-    let mut each = rest.chunks(BESIDE);
-    each.find_map(|few| {
-        let tried: Vec<_> = few.par_iter().map(|k| try_out(*k)).collect();
-        tried.into_iter().flatten().next()
-    })
+    for few in rest.chunks(BESIDE) {
+        let tried = in_order(few.par_iter().map(|k| try_out(*k)))?;
+        if let Some(found) = tried.into_iter().flatten().next() {
+            return Ok(Some(found));
+        }
+    }
+    Ok(None)
 }
 
 /// Controls that lower a problem's cost from a state on, from a guess. `progress` is called after every iteration and may end it; the plan so far is then what is found.
 ///
 /// # Errors
 /// A problem or settings that don't fit the simulator (limits the wrong way round, lists of wrong lengths, numbers that aren't finite, names that there aren't), a guess that can't be
-/// simulated or whose cost isn't finite, and derivatives that can't be found. Trials that fail are shortened instead.
+/// simulated or whose cost isn't finite, and derivatives that can't be found. Trials that fail are shortened instead, but for what ends all: [`Error::Controller`](crate::Error::Controller) of a controller
+/// or a cost, and [`Error::Stopped`](crate::Error::Stopped).
 pub fn ilqr(
     simulator: &Simulator,
     start: &State,
@@ -197,7 +203,7 @@ pub(super) fn solve(
         }
         iterations += 1;
         let used = regularisation;
-        let found = search(ready, simulator, start, &run, &sweep, settings.trials);
+        let found = search(ready, simulator, start, &run, &sweep, settings.trials)?;
         watch.lap(&mut times.rollouts);
         let (part, fell) = match found {
             Some((part, next)) => {

@@ -139,10 +139,11 @@ impl Guess<'_> {
                     |k: usize, _: &DVector<f64>, _: &DVector<f64>, _: Option<&DVector<f64>>| {
                         plan.planned(step(k))
                     };
+                let failed = |e: Error| if e.ends_search() { Err(e) } else { Ok(()) };
                 ready
                     .run(simulator, start, with_feedback)
-                    .or_else(|_| ready.run(simulator, start, alone))
-                    .or_else(|_| Guess::Zero.run(ready, simulator, start))
+                    .or_else(|e| failed(e).and_then(|()| ready.run(simulator, start, alone)))
+                    .or_else(|e| failed(e).and_then(|()| Guess::Zero.run(ready, simulator, start)))
             }
         }
     }

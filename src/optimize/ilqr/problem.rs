@@ -112,6 +112,9 @@ impl Ready {
                 ));
             }
         }
+        // Before anything is made for each of them.
+        let steps = problem.knots.saturating_mul(problem.hold);
+        (simulator.check_steps(steps)).map_err(|e| e.within("problem: knots · hold"))?;
         let controls = simulator.system().controls;
         if controls == 0 {
             return Err(Error::Unsupported {

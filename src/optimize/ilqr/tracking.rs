@@ -11,25 +11,88 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Tracking(pub(super) Arc<Track>);
 
-/// A plan, as feedback needs it.
-pub(super) struct Track {
+/// A plan, as feedback needs it: to be kept, and made a [`Tracking`] again ([`Tracking::of`]).
+#[derive(Clone)]
+pub struct Track {
+    /// What planned it.
     pub simulator: Simulator,
     /// Time of its first state, s.
     pub start: f64,
+    /// Time steps from one knot to the next.
     pub hold: usize,
-    /// (q, v) at every time step.
+    /// (q, v) at every time step, from its start to its end.
     pub states: Vec<(DVector<f64>, DVector<f64>)>,
     /// Controls × knots.
     pub controls: DMatrix<f64>,
+    /// K of each knot, controls × 2nv.
     pub gains: Vec<DMatrix<f64>>,
+    /// Least value of each control; infinite: none.
     pub lower: DVector<f64>,
+    /// Largest value.
     pub upper: DVector<f64>,
+}
+
+impl Track {
+    /// Refuses numbers that don't go with the simulator, or with each other.
+    fn validate(&self) -> Result<()> {
+        let system = self.simulator.system();
+        let (nq, nv) = (system.tree.coordinates(), system.tree.velocities());
+        let (nu, knots) = self.controls.shape();
+        let states = knots.saturating_mul(self.hold).saturating_add(1);
+        let fits = |(q, v): &(DVector<f64>, DVector<f64>)| [q.len(), v.len()] == [nq, nv];
+        // No number is at most one that isn't.
+        let within = |(least, most): (&f64, &f64)| least <= most;
+        let checks = [
+            ("start", self.start.is_finite()),
+            ("knots and hold", knots > 0 && self.hold > 0),
+            ("controls", nu == system.controls),
+            (
+                "states",
+                self.states.len() == states && self.states.iter().all(fits),
+            ),
+            (
+                "gains",
+                self.gains.len() == knots && self.gains.iter().all(|k| k.shape() == (nu, 2 * nv)),
+            ),
+            (
+                "limits",
+                self.lower.len() == nu
+                    && self.upper.len() == nu
+                    && self.lower.iter().zip(&self.upper).all(within),
+            ),
+        ];
+        match checks.iter().find(|(_, right)| !right) {
+            None => Ok(()),
+            Some((name, _)) => Err(Error::input(
+                format!("tracking of a plan: {name}"),
+                "what doesn't go with the rest",
+                format!(
+                    "must be those of a plan of {} controls, {nq} coordinates and {nv} velocities",
+                    system.controls
+                ),
+            )),
+        }
+    }
 }
 
 /// Part of a step by which rounding may move a time.
 const ROUNDING: f64 = 1e-6;
 
 impl Tracking {
+    /// The feedback about a plan that was kept.
+    ///
+    /// # Errors
+    /// Numbers that don't go with its simulator, or with each other.
+    pub fn of(track: Track) -> Result<Self> {
+        track.validate()?;
+        Ok(Self(Arc::new(track)))
+    }
+
+    /// The plan.
+    pub fn track(&self) -> &Track {
+        &self.0
+    }
+
     /// Time steps of the plan between its start and a time; negative before it.
     pub fn step_at(&self, time: f64) -> isize {
         let steps = (time - self.0.start) / self.0.simulator.time_step();
@@ -104,6 +167,14 @@ impl Policy for Tracking {
 
     fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         self.check(observed.q, observed.v)?;
+        let controls = self.0.controls.nrows();
+        if control_bar.len() != controls {
+            return Err(Error::input(
+                "tracking of a plan: control_bar",
+                format!("{} numbers", control_bar.len()),
+                format!("must be {controls} numbers, one per control"),
+            ));
+        }
         let step = self.step_at(observed.time);
         let (u, fed_back) = self.before_limits(step, observed.q, observed.v);
         let Some((knot, moved)) = fed_back else {

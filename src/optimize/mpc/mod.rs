@@ -60,7 +60,7 @@ pub struct Replan {
     pub stop: Option<IlqrStop>,
     /// Time that it took, s.
     pub seconds: f64,
-    /// Why it failed; the plan before then goes on.
+    /// Why it failed, what a cost or a controller of the user's own raised included; the plan before then goes on.
     pub failure: Option<String>,
 }
 

@@ -86,7 +86,7 @@ fn check_surface(body: &Body, shape: &Shape, field: &str) -> Result<()> {
         return Err(Error::input(
             place(body, &format!("{field}.path")),
             "nothing",
-            "give the path of an OBJ, STL or PLY file",
+            "give the path of an OBJ, STL, PLY or DAE file",
         ));
     }
     crate::shape::validate(shape, &place(body, field))

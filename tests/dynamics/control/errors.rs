@@ -1,12 +1,13 @@
 //! What can't be is refused, with its place and what would be right.
 
-use super::vehicle;
+use super::{solve, vehicle};
 use crate::support::says;
 use hydrograd::optimize::{
     Cost, CostPoint, CustomCost, Guess, IlqrProgress, IlqrSettings, IlqrStop, Mpc, MpcSettings,
-    Problem, Quadratic, Target, Term, ilqr, terms,
+    Problem, Quadratic, Target, Term, Track, Tracking, ilqr, terms,
 };
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
+use hydrograd::simulate::{Observation, Policy};
 use hydrograd::{Error, Fidelity, Result, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
@@ -41,6 +42,14 @@ fn problems_that_cannot_be() {
         (
             Problem::new(5, effort()).hold(0),
             vec!["hold", "at least 1"],
+        ),
+        (
+            Problem::new(6_000_000, effort()),
+            vec!["knots · hold", "at most 5000000"],
+        ),
+        (
+            Problem::new(usize::MAX, effort()).hold(2),
+            vec!["knots · hold", "at most 5000000"],
         ),
         (
             Problem::new(5, effort()).limits([1.0], [-1.0]),
@@ -255,6 +264,48 @@ fn states_that_cannot_be() {
     assert!(next.iter().all(|u| u.is_finite()));
 }
 
+#[test]
+fn feedback_of_other_sizes() {
+    let sim = simulator();
+    let problem = Problem::new(5, Cost::default().running(terms::effort(1.0)));
+    let tracking = solve(&sim, &problem, &IlqrSettings::default()).tracking();
+    let (q, v) = sim.start();
+    let seen = Observation {
+        step: 0,
+        time: 0.0,
+        q,
+        v,
+        mode: 0,
+    };
+    for count in [2, 9] {
+        let found = tracking.act_vjp(&seen, &DVector::zeros(count));
+        let given = format!("got {count} numbers");
+        let words = ["control_bar", given.as_str(), "must be 8"];
+        says(found.err().expect("an error"), &words);
+    }
+    let again = Tracking::of(tracking.track().clone()).unwrap();
+    let moved = v.map(|x| x + 0.1);
+    let controls = |of: &Tracking| of.control(2, q, &moved).unwrap();
+    assert_eq!(controls(&again), controls(&tracking));
+    let with = |change: &dyn Fn(&mut Track)| {
+        let mut track = tracking.track().clone();
+        change(&mut track);
+        Tracking::of(track).err().expect("an error")
+    };
+    let rest = "8 controls, 9 coordinates and 8 velocities";
+    for (error, what) in [
+        (with(&|t| t.hold = 2), "states"),
+        (with(&|t| t.hold = 0), "knots and hold"),
+        (with(&|t| t.gains.truncate(4)), "gains"),
+        (with(&|t| t.states[3].1 = DVector::zeros(7)), "states"),
+        (with(&|t| t.controls = DMatrix::zeros(7, 5)), "controls"),
+        (with(&|t| t.lower[1] = f64::NAN), "limits"),
+        (with(&|t| t.start = f64::NAN), "start"),
+    ] {
+        says(error, &["tracking of a plan", what, rest]);
+    }
+}
+
 struct Wrong(&'static str);
 
 impl CustomCost for Wrong {
@@ -308,6 +359,54 @@ fn a_gradient_that_leads_uphill_ends_stuck() {
     let plan = ilqr(&sim, &start, &problem, Guess::Zero, &settings, on).unwrap();
     assert_eq!(plan.stop, IlqrStop::Stuck, "{:?}", plan.costs);
     assert!(plan.gradient > 0.0);
+}
+
+/// A cost that draws to a place, and can't be told near it: by the user's own fault, or not.
+struct Near {
+    own: bool,
+}
+
+impl CustomCost for Near {
+    fn value(&self, at: &CostPoint) -> Result<f64> {
+        let x = at.sample().q[0];
+        match (x > 0.01, self.own) {
+            (true, true) => Err(Error::Controller {
+                source: "of my own".into(),
+            }),
+            (true, false) => Err(Error::input("my cost", x, "must be farther off")),
+            (false, _) => Ok(1e4 * (x - 0.02).powi(2)),
+        }
+    }
+
+    fn quadratic(&self, at: &CostPoint) -> Result<Quadratic> {
+        let mut out = Quadratic::zeros(16, at.control.map_or(8, |u| u.len()));
+        out.value = self.value(at)?;
+        out.x[0] = 2e4 * (at.sample().q[0] - 0.02);
+        out.xx[(0, 0)] = 2e4;
+        Ok(out)
+    }
+}
+
+#[test]
+fn what_a_cost_raises_ends_the_search_and_a_trial_that_fails_does_not() {
+    let sim = simulator();
+    let start = sim.initial().unwrap();
+    let settings = IlqrSettings {
+        iterations: 3,
+        ..IlqrSettings::default()
+    };
+    let made = |own: bool| {
+        let cost = Cost::default()
+            .running(terms::effort(1e-6))
+            .running(terms::custom(Near { own }));
+        let on = |_: &IlqrProgress| ControlFlow::Continue(());
+        let problem = Problem::new(5, cost);
+        ilqr(&sim, &start, &problem, Guess::Zero, &settings, on)
+    };
+    let plan = made(false).unwrap();
+    assert!(plan.cost() < plan.costs[0], "{:?}", plan.costs);
+    let error = made(true).err().expect("an error");
+    assert!(matches!(error, Error::Controller { .. }), "{error}");
 }
 
 #[test]

@@ -109,12 +109,12 @@ const MASS_FLAT: f64 = 0.5;
 pub(crate) const LARGER: [f64; 2] = [2.5, 4.5];
 /// Of the force on a small body beside a large coarse one, by the square of how coarse it is, and the most of it.
 const COARSE: f64 = 0.7;
-const COARSE_MOST: f64 = 1.0;
+const COARSE_MOST: f64 = 1.5;
 /// The same through a film, by the first power, until it has closed: bodies are held apart no farther than gaps of their own size ask for.
 const COARSE_FILM: f64 = 0.8;
 /// Of its added mass then, which such films don't make up for, and the most of it.
-const COARSE_MASS: f64 = 0.08;
-const COARSE_MASS_MOST: f64 = 0.25;
+const COARSE_MASS: f64 = 0.12;
+const COARSE_MASS_MOST: f64 = 0.4;
 
 impl Across {
     /// 0 between round surfaces, 1 between flat ones.

@@ -281,7 +281,7 @@ fn feedback_of_other_sizes() {
         let found = tracking.act_vjp(&seen, &DVector::zeros(count));
         let given = format!("got {count} numbers");
         let words = ["control_bar", given.as_str(), "must be 8"];
-        says(found.err().expect("an error"), &words);
+        says(found.expect_err("an error"), &words);
     }
     let again = Tracking::of(tracking.track().clone()).unwrap();
     let moved = v.map(|x| x + 0.1);

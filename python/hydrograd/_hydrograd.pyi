@@ -340,7 +340,7 @@ class Scene:
         """Reads a scene file (TOML); paths of meshes are relative to it, and absolute in the scene."""
     @staticmethod
     def from_toml(text: str, folder: _Path | None = None) -> Scene:
-        """A scene from TOML text; paths of meshes are relative to `folder`, and absolute in the scene."""
+        """A scene from TOML text; paths of meshes are relative to `folder` (default: the current one), and absolute in the scene."""
     @staticmethod
     def from_urdf(
         path: _Path,

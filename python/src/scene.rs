@@ -71,11 +71,12 @@ impl Scene {
         light(py, || hydrograd::Scene::load(path)).map(Self)
     }
 
-    /// A scene from TOML text; paths of meshes are relative to `folder`, and absolute in the scene.
+    /// A scene from TOML text; paths of meshes are relative to `folder` (default: the current one), and absolute in the scene.
     #[staticmethod]
     #[pyo3(signature = (text, folder=None))]
     fn from_toml(py: Python<'_>, text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
-        let folder = folder.unwrap_or_default();
+        // The folder in which the program is now, wherever it goes on.
+        let folder = folder.unwrap_or_else(|| ".".into());
         light(py, || hydrograd::Scene::from_toml(text, folder)).map(Self)
     }
 

@@ -24,12 +24,13 @@ impl Scene {
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let text = read_text(path)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let folder = whole.parent().unwrap_or(Path::new(""));
         let scene = parse(&text, folder, path).map_err(|message| parse_error(path, message))?;
         with_robots(scene, folder)
     }
 
-    /// A scene from TOML text. Paths of meshes are taken relative to `folder`, and are absolute in the scene.
+    /// A scene from TOML text. Paths of meshes are taken relative to `folder`, and are absolute in the scene; with an empty one they stay what they are.
     pub fn from_toml(text: &str, folder: impl AsRef<Path>) -> Result<Self> {
         let name = Path::new(TEXT);
         let folder = folder.as_ref();
@@ -161,6 +162,7 @@ fn parse(text: &str, folder: &Path, file: &Path) -> std::result::Result<Scene, S
         for shape in body.shape.iter_mut().chain(pieces) {
             if let Shape::Mesh { path, .. } = shape
                 && !path.as_os_str().is_empty()
+                && !folder.as_os_str().is_empty()
             {
                 // What it is doesn't depend on the folder in which the program goes on.
                 let joined = folder.join(&*path);

@@ -608,7 +608,7 @@ fn bodies_in_one_another_are_refused() {
     let report = json(&["run", &near, "--steps", "1", "--no-films"]);
     let said = report["warnings"].to_string();
     assert!(
-        said.contains("smallest gap") && said.contains("compressed sources"),
+        said.contains("narrowest against what is resolved") && said.contains("compressed sources"),
         "{said}"
     );
 

@@ -237,7 +237,8 @@ counts = [count for count, _ in seen]
 assert len(set(counts)) > 2 and counts[-1] == len(mpc.replans) == len(run.replans) == 10
 assert all(same for _, same in seen)
 
-# What Ctrl-C leaves to itself is waited for.
+# What Ctrl-C leaves to itself is waited for. Shells start programs in the background deaf to it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
     mpc.run(sim, 10**5)

@@ -15,6 +15,14 @@ pub use wave::{Wave, WaveJoint};
 use crate::{Error, Result};
 use nalgebra::DVector;
 
+/// Part of a step by which rounding may move a time.
+const ROUNDING: f64 = 1e-6;
+
+/// How many time steps (s) a clock has made that started a time (s) ago, a whole number; negative before it starts.
+pub(crate) fn steps_at(time: f64, time_step: f64) -> f64 {
+    (time / time_step + ROUNDING).floor()
+}
+
 /// What a controller sees at the start of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {

@@ -1,6 +1,6 @@
 //! Controls that were found before.
 
-use super::{Action, ActionBar, Observation, Policy, expect};
+use super::{Action, ActionBar, Observation, Policy, expect, steps_at};
 use crate::Result;
 use nalgebra::DVector;
 
@@ -16,13 +16,10 @@ pub struct Playback {
     pub time_step: f64,
 }
 
-/// Of a step: times are products of numbers of steps, rounded.
-const ROUNDING: f64 = 1e-9;
-
 impl Playback {
     /// Which controls are those of a time.
     fn row(&self, time: f64) -> usize {
-        (time / self.time_step * (1.0 + ROUNDING)) as usize
+        steps_at(time, self.time_step) as usize
     }
 }
 

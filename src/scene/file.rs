@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
 
 use super::problem::{Problem, Reader};
-use super::{Body, Origin, Scene, Shape};
+use super::{Body, Origin, Scene};
 use crate::{Error, Result};
 
 /// Stands for the file of a scene that is read from text.
@@ -158,16 +158,12 @@ fn parse(text: &str, folder: &Path, file: &Path) -> std::result::Result<Scene, S
     let document = DeTable::parse(text).map_err(broken)?;
     for (b, body) in scene.bodies.iter_mut().enumerate() {
         body.origin = origin(document.get_ref(), (b, body), file, line);
-        let pieces = body.collision.iter_mut().map(|piece| &mut piece.shape);
-        for shape in body.shape.iter_mut().chain(pieces) {
-            if let Shape::Mesh { path, .. } = shape
-                && !path.as_os_str().is_empty()
-                && !folder.as_os_str().is_empty()
-            {
-                // What it is doesn't depend on the folder in which the program goes on.
-                let joined = folder.join(&*path);
-                *path = std::path::absolute(&joined).unwrap_or(joined);
-            }
+    }
+    for path in scene.mesh_paths_mut() {
+        if !path.as_os_str().is_empty() && !folder.as_os_str().is_empty() {
+            // What it is doesn't depend on the folder in which the program goes on.
+            let joined = folder.join(&*path);
+            *path = std::path::absolute(&joined).unwrap_or(joined);
         }
     }
     Ok(scene)

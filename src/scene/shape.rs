@@ -4,9 +4,33 @@ use super::{Scene, Shape};
 use crate::shape;
 use crate::{Error, Result};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 impl Scene {
+    /// The files of meshes, of all bodies and of their pieces for contact, in their order.
+    pub(crate) fn mesh_paths(&self) -> impl Iterator<Item = &PathBuf> {
+        let shapes = self.bodies.iter().flat_map(|body| {
+            let pieces = body.collision.iter().map(|piece| &piece.shape);
+            body.shape.iter().chain(pieces)
+        });
+        shapes.filter_map(|shape| match shape {
+            Shape::Mesh { path, .. } => Some(path),
+            _ => None,
+        })
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn mesh_paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let shapes = self.bodies.iter_mut().flat_map(|body| {
+            let pieces = body.collision.iter_mut().map(|piece| &mut piece.shape);
+            body.shape.iter_mut().chain(pieces)
+        });
+        shapes.filter_map(|shape| match shape {
+            Shape::Mesh { path, .. } => Some(path),
+            _ => None,
+        })
+    }
+
     /// The parameters of all bodies' shapes with their values, m (a mesh's scale: 1): `body.radius`, `body.size.y` … ([`Shape::parameters`]).
     pub fn shape_parameters(&self) -> Vec<(String, f64)> {
         let mut out = Vec::new();

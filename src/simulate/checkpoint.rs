@@ -92,7 +92,6 @@ impl Simulator {
         digest.update(scene.to_toml()?);
         // Choices are plain data: they always serialise.
         digest.update(serde_json::to_vec(&self.choices).unwrap_or_default());
-        let digest = digest.finalize();
-        Ok(digest.iter().map(|b| format!("{b:02x}")).collect())
+        Ok(format!("{:x}", digest.finalize()))
     }
 }

@@ -1,6 +1,6 @@
 //! What stood in the files of a scene's meshes: it is the same scene wherever they stand, and another one once they are edited.
 
-use crate::scene::{Scene, Shape};
+use crate::scene::Scene;
 use crate::{Error, Result};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -12,15 +12,7 @@ pub(super) struct MeshFiles(Vec<Option<String>>);
 impl MeshFiles {
     /// Of a scene as its simulator is made: later they may be edited, or gone.
     pub fn of(scene: &Scene) -> Self {
-        let shapes = scene.bodies.iter().flat_map(|body| {
-            let pieces = body.collision.iter().map(|piece| &piece.shape);
-            body.shape.iter().chain(pieces)
-        });
-        let paths = shapes.filter_map(|shape| match shape {
-            Shape::Mesh { path, .. } => Some(path),
-            _ => None,
-        });
-        Self(paths.map(|path| digest(path).ok()).collect())
+        Self(scene.mesh_paths().map(|path| digest(path).ok()).collect())
     }
 
     /// Puts digests in place of the paths of the same scene.
@@ -28,15 +20,7 @@ impl MeshFiles {
     /// # Errors
     /// A file that can't be read, now as then.
     pub fn put_into(&self, scene: &mut Scene) -> Result<()> {
-        let shapes = scene.bodies.iter_mut().flat_map(|body| {
-            let pieces = body.collision.iter_mut().map(|piece| &mut piece.shape);
-            body.shape.iter_mut().chain(pieces)
-        });
-        let paths = shapes.filter_map(|shape| match shape {
-            Shape::Mesh { path, .. } => Some(path),
-            _ => None,
-        });
-        for (path, known) in paths.zip(&self.0) {
+        for (path, known) in scene.mesh_paths_mut().zip(&self.0) {
             let found = match known {
                 Some(known) => known.clone(),
                 None => digest(path)?,
@@ -54,6 +38,5 @@ fn digest(path: &Path) -> Result<String> {
         action: "read",
         source,
     })?;
-    let digest = Sha256::digest(&bytes);
-    Ok(digest.iter().map(|b| format!("{b:02x}")).collect())
+    Ok(format!("{:x}", Sha256::digest(&bytes)))
 }

@@ -78,6 +78,9 @@ pub use simulator::{AddedMass, Simulator};
 pub use summary::Summary;
 pub use tangents::{Displacement, Tangents, Variables};
 
+#[cfg(feature = "opt")]
+pub(crate) use crate::policy::steps_at;
+
 pub use crate::assembly::Choices;
 pub use crate::dynamics::State;
 pub use crate::policy::{

@@ -107,11 +107,11 @@ impl Simulator {
                 x != 0.0 && (x - y).abs() > SAME * x.abs().max(y.abs())
             };
             if let Some(i) = (0..given.len()).find(differs) {
-                let moved = self.system().drives.iter().zip(self.system().tree.links());
+                let mut joints = self.system().drives.iter().zip(self.system().tree.links());
                 let locked = |(drive, link): (&Drive, &Link)| {
                     *drive == Drive::Locked && name == "v" && link.v.contains(&i)
                 };
-                let right = match moved.into_iter().any(locked) {
+                let right = match joints.any(locked) {
                     true => "the joint is locked and can't move; give 0".into(),
                     false => format!(
                         "the joint is driven, and at t = {time} s its motion has {}; give that, or 0",

@@ -297,7 +297,7 @@ impl Clearance {
         (0.75 / PI * volumes.fold(f64::INFINITY, f64::min)).cbrt()
     }
 
-    /// Radius of the ball with as large a surface as the larger one of the bodies at a gap, m; of none at a wall, which is resolved however small the body.
+    /// Radius of the ball with as large a surface as the larger one of the bodies at a gap, m; 0 at a wall, which is resolved however small the body.
     pub fn expanse(&self, gap: &Gap) -> f64 {
         let Other::Body(second) = gap.second else {
             return 0.0;

@@ -10,7 +10,8 @@
 //! x = max(e, r)/(h + s)                                       a body of size s beside one much larger, whose faces or sources are coarse for it
 //! ```
 //!
-//! The constants are fitted to `cargo bench --bench gap` (docs/accuracy-coupled.md), whose truths they are not to fall under by more than a factor of three.
+//! The constants are fitted to `cargo bench --bench gap` (docs/accuracy-coupled.md), those of x to the cases of tests/water/gap_error.rs; by more than a factor of three they are not to fall under
+//! the truth of either.
 
 use serde::Serialize;
 use strum::{Display, IntoStaticStr};
@@ -69,8 +70,10 @@ pub(crate) struct Across {
     pub tolerance: f64,
     /// The gap from which on there is a film, m.
     pub reach: Option<f64>,
-    /// What the larger body resolves, by faces or sources, over how far the middle of the smaller one is; 0 where they are of like sizes.
-    pub coarse: f64,
+    /// Of the ball with as large a surface as the larger body, m; 0 at a wall.
+    pub expanse: f64,
+    /// The gap that compressed sources resolve there, m; 0 where there are none.
+    pub resolved: f64,
 }
 
 /// Curvature of relative radius, in sizes: up to the first surfaces are round, from the second on flat.
@@ -106,7 +109,7 @@ const MASS: f64 = 0.1;
 const MASS_FLAT: f64 = 0.5;
 
 /// Sizes of the larger body, in those of the smaller one, between which what the larger one resolves begins to tell beside the gap.
-pub(crate) const LARGER: [f64; 2] = [2.5, 4.5];
+const LARGER: [f64; 2] = [2.5, 4.5];
 /// Of the force on a small body beside a large coarse one, by the square of how coarse it is, and the most of it.
 const COARSE: f64 = 0.7;
 const COARSE_MOST: f64 = 1.5;
@@ -116,11 +119,21 @@ const COARSE_FILM: f64 = 0.8;
 const COARSE_MASS: f64 = 0.12;
 const COARSE_MASS_MOST: f64 = 0.4;
 
+/// 0 up to the first of two numbers, 1 from the second on, straight between them.
+fn between(x: f64, [from, to]: [f64; 2]) -> f64 {
+    ((x - from) / (to - from)).clamp(0.0, 1.0)
+}
+
 impl Across {
     /// 0 between round surfaces, 1 between flat ones.
     pub fn flatness(&self) -> f64 {
-        let [round, flat] = FLAT;
-        ((self.curvature / self.size - round) / (flat - round)).clamp(0.0, 1.0)
+        between(self.curvature / self.size, FLAT)
+    }
+
+    /// What the larger body resolves, by faces or sources, over how far the middle of the smaller one is (x above); 0 where they are of like sizes.
+    fn coarse(&self) -> f64 {
+        let larger = between(self.expanse / self.size, LARGER);
+        larger * self.edge.max(self.resolved) / (self.gap + self.size)
     }
 
     /// By sources as they are.
@@ -162,40 +175,44 @@ impl Across {
     /// By what there is without films, and one once the gap is so narrow: it takes over soon, by 1 − (h/h_m)³.
     fn taken_over(&self, without: GapError, film: GapError) -> GapError {
         let Some(reach) = self.reach.filter(|reach| self.gap < *reach) else {
-            return without;
+            return self.beside_coarse(without);
         };
+        let (without, film) = (self.beside_coarse(without), self.beside_coarse(film));
         let left = (self.gap / reach).powi(3);
         let mix = |film: f64, without: f64| film + left * (without - film);
-        let coarse = COARSE_FILM * self.coarse.min(1.0) * self.gap / reach;
         GapError {
             carried: Carried::Film,
             added_mass: mix(film.added_mass, without.added_mass),
-            force: mix(film.force + coarse, without.force),
+            force: mix(film.force, without.force),
         }
     }
 
     /// With what a small body loses beside one whose faces or sources are coarse for it.
     fn beside_coarse(&self, mut error: GapError) -> GapError {
-        if error.carried == Carried::Film {
-            error.added_mass += (COARSE_MASS * self.coarse).min(COARSE_MASS_MOST);
-            return error;
-        }
-        let force = (COARSE * self.coarse.powi(2)).min(COARSE_MOST);
+        let coarse = self.coarse();
+        let (mass, force) = match (error.carried, self.reach) {
+            (Carried::Film, Some(reach)) => (
+                (COARSE_MASS * coarse).min(COARSE_MASS_MOST),
+                COARSE_FILM * coarse.min(1.0) * self.gap / reach,
+            ),
+            _ => {
+                let force = (COARSE * coarse.powi(2)).min(COARSE_MOST);
+                (MASS * force, force)
+            }
+        };
+        error.added_mass += mass;
         error.force = (error.force + force).min(MOST);
-        error.added_mass += MASS * force;
         error
     }
 
     /// By what compressed bodies have there.
     pub fn compressed(&self) -> GapError {
-        let film = self.beside_coarse(self.by_film(FILM));
-        self.taken_over(self.beside_coarse(self.by_sources()), film)
+        self.taken_over(self.by_sources(), self.by_film(FILM))
     }
 
     /// By what coupled panels have there.
     pub fn coupled(&self) -> GapError {
-        let film = self.beside_coarse(self.by_film(FILM_OF_PANELS));
-        self.taken_over(self.beside_coarse(self.by_panels()), film)
+        self.taken_over(self.by_panels(), self.by_film(FILM_OF_PANELS))
     }
 
     /// By panels.

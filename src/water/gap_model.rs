@@ -1,7 +1,7 @@
 //! What is known of a scene's gaps, and the estimated error of the water across them.
 
 use super::clearance::Clearance;
-use super::gap_error::{Across, Carried, GapError, LARGER};
+use super::gap_error::{Across, Carried, GapError};
 use super::resolved::{Resolved, narrowest};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::film::{Extent, Films};
@@ -68,17 +68,15 @@ impl GapModel {
             film.finer * carries.unwrap_or(gap.edge)
         });
         let (ratio, resolved) = narrowest(gaps, gap, poses, &self.resolved).unwrap_or((1.0, 0.0));
-        let size = clearance.size(gap);
-        let [alike, larger] = LARGER;
-        let larger = ((clearance.expanse(gap) / size - alike) / (larger - alike)).clamp(0.0, 1.0);
         let tolerances = gap.sides().map(|(b, _)| self.tolerances.get(b));
         Across {
             gap: distance,
             edge: gap.edge,
             film_edge,
             curvature: (area / (2.0 * PI * beyond)).max(LEAST * gap.edge),
-            size,
-            coarse: larger * gap.edge.max(resolved) / (distance + size),
+            size: clearance.size(gap),
+            expanse: clearance.expanse(gap),
+            resolved,
             ratio: ratio.max(LEAST),
             tolerance: tolerances.flatten().fold(0.0, |a, b| b.max(a)),
             reach: film.map(|(film, _)| film.reach),

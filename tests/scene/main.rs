@@ -1,8 +1,6 @@
 //! Scenes: files, what is refused and how that is said, and the example scenes.
 
 mod api_input;
-#[cfg(feature = "urdf")]
-mod collada;
 mod examples;
 mod input;
 #[cfg(feature = "urdf")]

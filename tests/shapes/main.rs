@@ -1,5 +1,7 @@
 //! Bodies' surfaces: primitives, prisms, files, refinement, and the gaps between them.
 
+#[cfg(feature = "urdf")]
+mod collada;
 mod crossing;
 mod exact;
 #[cfg(feature = "meshio")]

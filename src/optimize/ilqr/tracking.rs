@@ -1,6 +1,6 @@
 //! The feedback that holds a robot to a plan.
 
-use crate::simulate::{Action, ActionBar, Observation, Policy, Simulator};
+use crate::simulate::{Action, ActionBar, Observation, Policy, Simulator, steps_at};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -75,9 +75,6 @@ impl Track {
     }
 }
 
-/// Part of a step by which rounding may move a time.
-const ROUNDING: f64 = 1e-6;
-
 impl Tracking {
     /// The feedback about a plan that was kept.
     ///
@@ -95,8 +92,7 @@ impl Tracking {
 
     /// Time steps of the plan between its start and a time; negative before it.
     pub fn step_at(&self, time: f64) -> isize {
-        let steps = (time - self.0.start) / self.0.simulator.time_step();
-        (steps + ROUNDING).floor() as isize
+        steps_at(time - self.0.start, self.0.simulator.time_step()) as isize
     }
 
     /// Controls of the plan at its time step `step`, without feedback.

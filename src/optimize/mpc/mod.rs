@@ -10,7 +10,7 @@ pub use run::{MpcProgress, MpcRun};
 
 use super::cost::Sizes;
 use super::ilqr::{self, Guess, IlqrProgress, IlqrSettings, IlqrStop, Plan, Problem, Ready};
-use crate::simulate::Simulator;
+use crate::simulate::{Simulator, steps_at};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use serde::Serialize;
@@ -91,9 +91,6 @@ fn check_plant(plant: Sizes, model: Sizes) -> Result<()> {
         )),
     }
 }
-
-/// Part of a step by which rounding may move a time.
-const ROUNDING: f64 = 1e-6;
 
 impl Mpc {
     /// For a model and what it is to do.
@@ -214,7 +211,7 @@ impl Mpc {
             self.start = time;
         }
         let dt = self.model.time_step();
-        let now = ((time - self.start) / dt + ROUNDING).floor();
+        let now = steps_at(time - self.start, dt);
         let last = self.held.as_ref().map_or(0, |(step, _)| *step);
         let before = self.time_of(last);
         if !(now.is_finite() && now >= last as f64) {

@@ -108,7 +108,7 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
         }
     }
     let mut out = Planned::default();
-    let mut strengths = Vec::with_capacity(bodies.len());
+    let mut seen = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
         let Some(mesh) = body.mesh else {
             return Err(Error::Unsupported {
@@ -119,7 +119,7 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
         };
         let properties = mesh.mass_properties();
         let ball = mesh.bounding_ball();
-        strengths.push(Seen {
+        seen.push(Seen {
             strength: strength(&properties, body.added_mass.as_ref())?,
             centre: poses[b].apply(&ball.center),
             radius: ball.radius,
@@ -158,7 +158,7 @@ fn plan(problem: &Problem, poses: &[Pose], within: &GapsWithin) -> Result<Planne
             if a == b && walls.is_empty() {
                 continue;
             }
-            let (first, second) = (&strengths[a], &strengths[b]);
+            let (first, second) = (&seen[a], &seen[b]);
             let cutoff = first.cutoff(second, aim);
             out.plan.cutoffs.push(((a, b), cutoff));
             let c = (first.centre - second.centre).norm();

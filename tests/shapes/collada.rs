@@ -1,5 +1,6 @@
 //! Shapes in COLLADA files: where nodes place them, and what their polygons become.
 
+use crate::files::{CUBE, SIDES, put};
 use crate::support::says;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::shape::file::{FileMesh, read_unchecked};
@@ -27,24 +28,12 @@ fn read(
 <scene><instance_visual_scene url="#s"/></scene></COLLADA>"##
     );
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("part.dae");
-    std::fs::write(&path, text).unwrap();
-    read_unchecked(&path, 1.0)
+    read_unchecked(&put(&folder, "part.dae", text), 1.0)
 }
 
 const SHOWN: &str = r##"<instance_geometry url="#part"/>"##;
 const INPUT: &str = r##"<input semantic="VERTEX" source="#v" offset="0"/>"##;
 const TETRAHEDRON: [[f64; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
-const CUBE: [[f64; 3]; 8] = [
-    [0., 0., 0.],
-    [1., 0., 0.],
-    [1., 1., 0.],
-    [0., 1., 0.],
-    [0., 0., 1.],
-    [1., 0., 1.],
-    [1., 1., 1.],
-    [0., 1., 1.],
-];
 
 /// A tetrahedron in a scene.
 fn tetrahedron(scene: &str, unit: f64) -> hydrograd::Result<FileMesh> {
@@ -143,18 +132,10 @@ fn strips_and_fans_are_read_as_such() {
         row(&around),
         row(&ends)
     );
-    let sides = [
-        [3, 2, 1, 0],
-        [4, 5, 6, 7],
-        [0, 1, 5, 4],
-        [1, 2, 6, 5],
-        [2, 3, 7, 6],
-        [3, 0, 4, 7],
-    ];
-    let fans = sides.map(|side| format!("<p>{}</p>", row(&side))).concat();
+    let fans = SIDES.map(|side| format!("<p>{}</p>", row(&side))).concat();
     let fans = format!("<trifans count=\"6\">{INPUT}{fans}</trifans>");
     for primitives in [strips, fans] {
-        let raw = part(&CUBE, &primitives).unwrap();
+        let raw = part(&CUBE.map(|x| x.map(f64::from)), &primitives).unwrap();
         assert_eq!(raw.repairs.collapsed, 0, "{primitives}");
         let mesh = raw.into_mesh().unwrap();
         assert_eq!((mesh.vertices().len(), mesh.faces().len()), (8, 12));

@@ -12,6 +12,10 @@ use std::path::Path;
 
 /// Of the heaviest moving mass (a joint's inertia, for its limits) over Δt²: within a step contact takes ten elevenths of the way that it would go too far.
 pub(super) const STIFFNESS: f64 = 10.0;
+/// Added mass of a plate of area A at a gap h, ρ A²/h, in that: 0.035 of a square, 1/8π of a disc.
+const PLATE: f64 = 0.04;
+/// The same as [`STIFFNESS`] of what it weighs: ω Δt is no less than 1.6, and little comes back.
+const OF_PLATE: f64 = 2.5;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
 /// Gap at which surfaces touch, of the smallest body's radius: distances are smooth outside a body only.
@@ -99,7 +103,19 @@ pub(super) fn assemble(
         parameters.mass(b).max(displaced)
     };
     let heaviest = bodies().map(weight).fold(0.0, f64::max);
-    let stiffness = (given.stiffness).unwrap_or(STIFFNESS * heaviest / (dt * dt));
+    let wet = scene.fluid.density > 0.0 && water.fidelity.kind().coupled();
+    // A plate that lands carries the water under it, which may be a thousand times as heavy.
+    let gap = given.gap.unwrap_or(SKIN * size);
+    let film = |b: usize| {
+        let flat = surfaces[b].as_ref().map_or(0.0, |s| s.mesh.largest_flat());
+        PLATE * parameters.density() * flat * flat / gap
+    };
+    let films = match wet && solves_thin(water) && gap > 0.0 {
+        true => bodies().map(film).fold(0.0, f64::max),
+        false => 0.0,
+    };
+    let stiffness =
+        (given.stiffness).unwrap_or((STIFFNESS * heaviest).max(OF_PLATE * films) / (dt * dt));
     if stiffness <= 0.0 {
         return Err(Error::input(
             "contact.stiffness",
@@ -139,7 +155,7 @@ pub(super) fn assemble(
         changed: Vec::new(),
         laws,
         rigid: given.stiffness.is_none(),
-        wet: scene.fluid.density > 0.0 && water.fidelity.kind().coupled(),
+        wet,
     })
 }
 

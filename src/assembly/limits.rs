@@ -43,6 +43,7 @@ pub(super) fn assemble(
             v: link.v.start,
             range,
             rigid: asked(b).is_none(),
+            scale: 1.0,
             law: Law {
                 stiffness,
                 dissipation: 0.0,

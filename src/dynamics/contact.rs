@@ -66,14 +66,27 @@ pub struct PairContact {
     pub point: ContactPoint,
 }
 
-/// A law that is as stiff in the `n`-th part of a step as it was in the whole, and foresees no further than that part.
+/// A law that is as stiff in the `n`-th part of a step as it was in the whole, and foresees no further than that part. Its force sets in over a width that is
+/// less by as much as it is stiffer, or at no depth at all it would press n² times as hard.
 pub(super) fn sharpened(law: Law, n: usize) -> Law {
     let n = n as f64;
     Law {
         stiffness: law.stiffness * n * n,
         horizon: law.horizon / n,
+        width: law.width / (n * n),
         ..law
     }
+}
+
+/// The gap that a law is asked with at `gap`, whose stiffness is `scale` times what it was, and its slope. A sharper law stops what comes, but presses on what is in
+/// already as hard as before, or it would throw it out: of a depth d below g₀ it is asked with d/`scale`.
+pub(super) fn eased(law: &Law, scale: f64, gap: f64) -> (f64, f64) {
+    if scale == 1.0 {
+        return (gap, 1.0);
+    }
+    let share = 1.0 - 1.0 / scale;
+    let (depth, slope) = positive(law.gap - gap, scale * law.width);
+    (gap + share * depth, 1.0 - share * slope)
 }
 
 impl ContactModel {
@@ -144,16 +157,9 @@ impl PairContact {
         field[self.first] - self.second.map_or(Vec6::zeros(), |b| field[b])
     }
 
-    /// The gap that the law is asked with, and its slope. A sharper law stops what comes, but presses on what is in already as hard as
-    /// before, or it would throw it out: of a depth d below g₀ it is asked with d over the square of its sharpness.
+    /// [`eased`] at its gap.
     pub(super) fn eased_gap(&self) -> (f64, f64) {
-        let gap = self.point.gap;
-        if self.scale == 1.0 {
-            return (gap, 1.0);
-        }
-        let share = 1.0 - 1.0 / self.scale;
-        let (depth, slope) = positive(self.law.gap - gap, self.law.width);
-        (gap + share * depth, 1.0 - share * slope)
+        eased(&self.law, self.scale, self.point.gap)
     }
 
     /// How the first body moves against the second at the point.

@@ -3,7 +3,35 @@
 use super::mesh::{Edge, TriMesh};
 use hydrograd_adjoint::lie::Vec3;
 
+/// How far apart the unit normals of neighbours are that lie in one plane, at most.
+const FLAT: f64 = 1e-6;
+
 impl TriMesh {
+    /// Area of the largest part that is flat, m²: faces that share edges and lie in one plane. Of a round surface that is a face's.
+    pub(crate) fn largest_flat(&self) -> f64 {
+        let count = self.faces().len();
+        let normals: Vec<Vec3> = (0..count).map(|f| self.normal(f)).collect();
+        let mut beside = vec![Vec::new(); count];
+        for Edge { faces: [a, b], .. } in self.edges() {
+            if (normals[a] - normals[b]).norm() < FLAT {
+                beside[a].push(b);
+                beside[b].push(a);
+            }
+        }
+        let (mut seen, mut largest) = (vec![false; count], 0.0_f64);
+        for first in 0..count {
+            let (mut open, mut area) = (vec![first], 0.0);
+            while let Some(face) = open.pop() {
+                if !std::mem::replace(&mut seen[face], true) {
+                    area += self.area(face);
+                    open.extend(&beside[face]);
+                }
+            }
+            largest = largest.max(area);
+        }
+        largest
+    }
+
     /// The edges across which the normal turns by more than `angle` (rad), in the order of [`TriMesh::edges`].
     pub fn sharp_edges(&self, angle: f64) -> Vec<Edge> {
         let cosine = angle.cos();

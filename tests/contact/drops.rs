@@ -160,6 +160,52 @@ fn a_ball_lands_through_a_film() {
     check_gradient("a ball through a film", &mut simulator, 40, 1, 1e-5);
 }
 
+/// A plate that lands flat carries water that is hundreds of times as heavy, and steps are cut as its film closes: it gains no energy, and next to nothing comes back. A pebble beside it
+/// makes the gap of contact small.
+#[test]
+fn plates_land_and_stay() {
+    let tile = Shape::cuboid([0.1, 0.1, 0.002]);
+    let plate = Shape::cuboid([0.3, 0.3, 0.004]);
+    let coin = Shape::cylinder(0.05, 0.01);
+    for (name, shape, half, gap) in [
+        ("tile", &tile, 0.001, None),
+        ("plate", &plate, 0.002, None),
+        (
+            "plate at a tenth of a millimetre",
+            &plate,
+            0.002,
+            Some(1e-4),
+        ),
+        ("coin", &coin, 0.005, None),
+    ] {
+        for dt in [0.01, 0.005, 0.001] {
+            let mut scene = above_floor(1000.0);
+            scene.time_step = dt;
+            contact(&mut scene).gap = gap;
+            let body = Body::new(shape.clone().faces(320)).named("plate");
+            scene.add(body.density(2700.0).at([0.0, 0.0, 0.05]));
+            let pebble = Body::new(Shape::sphere(0.02).faces(320)).density(2500.0);
+            scene.add(pebble.at([-0.5, 0.0, 0.05]));
+            let settings = Settings::default().fidelity(Fidelity::Auto);
+            let simulator = Simulator::new(&scene, settings).unwrap();
+            let rollout = run(&simulator, (1.2 / dt) as usize);
+            let samples = rollout.samples();
+            let energy: Vec<f64> = samples.iter().map(|s| s.energy()).collect();
+            let height = |k: usize| samples[k].poses[0].translation.z - half;
+            let landed = (0..samples.len()).find(|k| height(*k) < 1e-3);
+            let rebound = landed.map(|k| (k..samples.len()).map(height).fold(0.0, f64::max));
+            let most = energy.iter().fold(0.0_f64, |a, b| a.max(*b));
+            println!(
+                "{name}, {dt} s: energy at most {most:.4} of {:.4} J, landed {landed:?}, back to {rebound:?} m, {:?} pieces at most",
+                energy[0],
+                rollout.pieces().iter().max()
+            );
+            assert!(most < 1.002 * energy[0], "{name} {dt}: {most}");
+            assert!(rebound.is_none_or(|r| r < 2e-3), "{name} {dt}: {rebound:?}");
+        }
+    }
+}
+
 /// The gaps at which surfaces touch can be read, and one over a twentieth of a body is told.
 #[test]
 fn gaps_of_contact_are_told() {

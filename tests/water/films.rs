@@ -77,6 +77,44 @@ fn a_disc_flat_over_a_wall() {
     }
 }
 
+/// Like bodies that lie flat on one another have like masses: where one's face ends so does the other's, and nothing of the film is beside it. Largest difference of any
+/// entry from coupled panels, relative to √(M_ii M_jj), and of both bodies' own blocks from one another.
+#[test]
+fn like_bodies_flat_on_one_another_are_alike() {
+    let cube = Shape::cuboid([0.2; 3]).faces(1280);
+    let disc = Shape::cylinder(0.1, 0.05).faces(1280);
+    for (name, shape, half) in [("cubes", cube, 0.1), ("discs", disc, 0.025)] {
+        for gap in [0.02, 0.01, 0.005] {
+            let mut scene = Scene::new(unit_water());
+            for z in [0.0, 2.0 * half + gap] {
+                scene.add(Body::new(shape.clone()).density(1.0).at([0.0, 0.0, z]));
+            }
+            let matrix = |settings: Settings| {
+                let simulator = Simulator::new(&scene, settings).unwrap();
+                simulator.added_mass().unwrap().matrix
+            };
+            let full = Settings::default().fidelity(Fidelity::Full);
+            let panels = matrix(full.method(Method::Panel));
+            let scale = |i: usize, j: usize| f64::sqrt(panels[(i, i)] * panels[(j, j)]);
+            for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
+                let m = matrix(films().fidelity(fidelity));
+                let (mut off, mut unlike) = (0.0_f64, 0.0_f64);
+                // Spinning about the axis of a disc moves no water.
+                for (i, j) in (0..5).flat_map(|i| (0..5).map(move |j| (i, j))) {
+                    for (a, b) in [(i, j), (i, 6 + j), (6 + i, 6 + j)] {
+                        off = off.max((m[(a, b)] - panels[(a, b)]).abs() / scale(a, b));
+                    }
+                    if i == j {
+                        unlike = unlike.max((m[(i, i)] / m[(6 + i, 6 + i)] - 1.0).abs());
+                    }
+                }
+                println!("{name}, gap {gap}, {fidelity:?}: off by {off:.3}, unlike {unlike:.3}");
+                assert!(off < 0.15 && unlike < 0.1, "{name} {gap}: {off} {unlike}");
+            }
+        }
+    }
+}
+
 /// Added mass along the gap and its slope, of the first body on a rail.
 fn along(scene: &Scene, settings: Settings) -> [f64; 2] {
     let simulator = Simulator::new(scene, settings).unwrap();

@@ -3,12 +3,16 @@
 use super::surface::FilmSurface;
 use crate::geometry::{Casing, Opposite, Solid, TriMesh};
 use std::borrow::Cow;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Faces of a curved shape from which on there are enough for a film; they lie in one another else.
 const ENOUGH: usize = 10_000;
 /// The same of others. At an edge more of them wouldn't help (docs/accuracy-coupled.md), and fewer are far too stiff.
 const ENOUGH_FLAT: usize = 1_000;
+
+/// Part of a body's surface from which on a flat part of it counts as one.
+const FLAT_PART: f64 = 0.05;
 
 /// What films see of a body: the faces that they may be solved on, and what others' faces are opposite to.
 #[derive(Clone)]
@@ -19,6 +23,8 @@ pub(crate) struct FilmBody {
     pub(super) casing: Casing,
     /// Whether it may have flat faces.
     pub(super) flat: bool,
+    /// Side of the square as large as its largest flat part, m; none where it is round.
+    face: Option<f64>,
 }
 
 impl FilmBody {
@@ -34,6 +40,7 @@ impl FilmBody {
             out.push(match (0..b).find(|a| same(*a, b)) {
                 Some(a) => out[a].clone(),
                 None => {
+                    let flat = mesh.largest_flat();
                     let (mesh, finer) = split(mesh, *solid, splits(b));
                     let surface = FilmSurface {
                         finer,
@@ -46,11 +53,22 @@ impl FilmBody {
                         surface: Arc::new(surface),
                         opposite: Arc::new(opposite),
                         flat: solid.is_none_or(Solid::has_faces),
+                        face: (flat > FLAT_PART * mesh.surface_area()).then(|| flat.sqrt()),
                     }
                 }
             });
         }
         out
+    }
+}
+
+impl FilmBody {
+    /// How far it goes on, from 0 to 1, beside the film of another body that is opposite, which reaches as far around that one as `rim` (m): the face of a like block ends where the other's
+    /// does. By both sizes alone, so that it changes nothing as bodies move.
+    pub(super) fn goes_on_beside(&self, other: &Self, rim: f64) -> f64 {
+        let Some(face) = self.face else { return 1.0 };
+        let round = PI.sqrt() * other.surface.size;
+        ((face - other.face.unwrap_or(round)) / (2.0 * rim)).clamp(0.0, 1.0)
     }
 }
 

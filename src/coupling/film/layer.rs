@@ -19,6 +19,8 @@ const ARC: [f64; 4] = [1.0, 1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0];
 const STEEP: f64 = 8.0;
 /// Of the series of √(1 − s), from s on: where the two stand at a right angle it is smooth, and a third too large.
 const COSINE: [f64; 3] = [-0.5, -1.0 / 8.0, -1.0 / 16.0];
+/// Square of the sine between the two sides from which on a face lies beside what is opposite rather than over it; at 1 it does altogether.
+const BESIDE: f64 = 0.5;
 /// Largest square of a sine that elements may give to rounding and their own size.
 const STEEPEST: f64 = 1.2;
 
@@ -86,12 +88,16 @@ pub(super) struct Thickness<D> {
 
 /// Where the other side faces.
 pub(super) struct Facing<D> {
-    /// Its unit normal.
+    /// Its normal, as long as its area is of the face's.
     pub normal: Vector<D>,
+    /// The same as a unit vector.
+    unit: Vector<D>,
     /// ∇d along the face.
     along: Vector<D>,
     /// Derivative of the cosine between the two sides by its square.
     bend: D,
+    /// How much there is of the other side, and its derivative by that square.
+    share: [D; 2],
 }
 
 /// The vertices of faces that are near, with their fields.
@@ -253,7 +259,7 @@ impl<D: Jet> Layer<D> {
                 spots,
                 corners,
                 thickness: [near, held].map(|d| Thickness::new(&d, face, film.bulge(face))),
-                facing: Facing::new(&near, face),
+                facing: Facing::new(&near, face, film.goes_on),
             });
         }
     }
@@ -373,24 +379,50 @@ fn arc<D: Jet>(steep: D) -> [D; 2] {
     ]
 }
 
+/// How much of the other side there is over a face at the square of a sine, and its derivative, where it goes on beside the film as far as `goes_on` says: 1 over
+/// it, and beside it that.
+fn share<D: Jet>(square: D, goes_on: f64) -> [D; 2] {
+    let t = (square - BESIDE) * (1.0 / (1.0 - BESIDE));
+    let lost = 1.0 - goes_on;
+    if lost == 0.0 || t.re() <= 0.0 {
+        return [D::from(1.0), D::from(0.0)];
+    }
+    if t.re() >= 1.0 {
+        return [D::from(goes_on), D::from(0.0)];
+    }
+    let left = -t + 1.0;
+    let value = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+    let slope = t * t * left * left * (30.0 / (1.0 - BESIDE));
+    [value * -lost + 1.0, slope * -lost]
+}
+
 impl<D: Jet> Facing<D> {
-    /// The other side's normal: its part along the face is what the distances do there. The arcs that meet both at right angles cut equal areas off both.
-    fn new(d: &[D; 3], face: &Element) -> Self {
+    /// The other side's normal: its part along the face is what the distances do there. The arcs that meet both at right angles cut equal areas off both, as far as there is
+    /// another side: a block's sides beside another one of its size have none.
+    fn new(d: &[D; 3], face: &Element, goes_on: f64) -> Self {
         let along = slope_of(d, face);
         let square = product(&along, &along);
         let [a, b, c] = COSINE;
         let cosine = square * (square * (square * c + b) + a) + 1.0;
+        let unit = std::array::from_fn(|i| along[i] - cosine * face.normal[i]);
+        let share = share(square, goes_on);
         Self {
-            normal: std::array::from_fn(|i| along[i] - cosine * face.normal[i]),
+            normal: scale(share[0], &unit),
+            unit,
             along,
             bend: square * (square * (3.0 * c) + 2.0 * b) + a,
+            share,
         }
     }
 
     /// The cotangents of the distances at the corners, from that of the normal.
     pub fn pull(&self, bar: &Vector<D>, face: &Element) -> [D; 3] {
-        let across = dot(bar, &face.normal) * self.bend * -2.0;
-        let bar = add(bar, &scale(across, &self.along));
+        let square = dot(bar, &face.normal) * self.bend * self.share[0] * -1.0
+            + product(bar, &self.unit) * self.share[1];
+        let bar = add(
+            &scale(self.share[0], bar),
+            &scale(square * 2.0, &self.along),
+        );
         [0, 1, 2].map(|k| dot(&bar, &face.gradients.column(k).into_owned()))
     }
 
@@ -398,8 +430,12 @@ impl<D: Jet> Facing<D> {
     pub fn slopes(&self, face: &Element) -> [Vector<D>; 3] {
         [0, 1, 2].map(|k| {
             let gradient = face.gradients.column(k).into_owned();
-            let across = dot(&self.along, &gradient) * self.bend * 2.0;
-            std::array::from_fn(|i| -across * face.normal[i] + gradient[i])
+            let square = dot(&self.along, &gradient) * 2.0;
+            let across = square * self.bend;
+            std::array::from_fn(|i| {
+                (-across * face.normal[i] + gradient[i]) * self.share[0]
+                    + self.unit[i] * square * self.share[1]
+            })
         })
     }
 }

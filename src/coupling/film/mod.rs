@@ -124,6 +124,8 @@ pub(crate) struct Film {
     pub width: Width,
     /// Distances between which the flow in it goes over into that around the bodies, m.
     rim: [f64; 2],
+    /// How far what is opposite goes on beside it, from 0 to 1.
+    goes_on: f64,
     pattern: Arc<Mutex<Option<LastPattern>>>,
 }
 
@@ -151,7 +153,17 @@ impl Film {
                 reach,
             },
             rim,
+            goes_on: 1.0,
             pattern: Arc::default(),
+        }
+    }
+
+    /// The same where what is opposite goes on beside it as far as it does beside the first body.
+    pub fn beside(self, own: &FilmBody, other: &FilmBody) -> Self {
+        let [_, end] = self.rim;
+        Self {
+            goes_on: other.goes_on_beside(own, end),
+            ..self
         }
     }
 

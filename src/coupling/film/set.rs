@@ -217,7 +217,11 @@ impl Films {
         let between = (self.bodies[body].surface.clone(), opposite.clone());
         let edged = self.bodies[body].flat || matches!(other, Side::Body(b) if self.bodies[b].flat);
         let shares = &self.shares;
-        Arc::new(Film::new(body, other, between, reach, shares, edged))
+        let film = Film::new(body, other, between, reach, shares, edged);
+        Arc::new(match other {
+            Side::Body(b) => film.beside(&self.bodies[body], &self.bodies[b]),
+            Side::Wall(_) => film,
+        })
     }
 
     /// The films at the poses, for a basis of body-frame twists; none of gaps that are wide. `names` are those of the bodies, for messages.

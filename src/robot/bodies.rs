@@ -187,7 +187,7 @@ fn base(
 /// The bodies of a file, as far as they are known.
 pub(super) struct Bodies<'b> {
     pub file: &'b File,
-    options: &'b Options,
+    pub options: &'b Options,
     pub groups: &'b [Group],
     pub moves: &'b [Option<Moves>],
     pub inertials: &'b [Inertial],

@@ -1,6 +1,7 @@
 //! Bodies that move without mass, or without inertia about what their joints turn them about.
 
 use super::bodies::Bodies;
+use super::joints::Moves;
 use super::report::Report;
 use super::surface::Immersed;
 use super::tree::{joint_place, link_place};
@@ -81,6 +82,14 @@ impl Bodies<'_> {
             return None;
         };
         let moves = self.moves[load].as_ref().filter(|_| has_mass(load))?;
+        // A rotor, a leader and a motion of its own tell a joint apart.
+        let apart = |m: &Moves| {
+            let driven = self.options.driven.contains_key(&m.name);
+            m.dynamics.armature > 0.0 || m.mimic.is_some() || driven
+        };
+        if apart(moves) || self.moves[g].as_ref().is_some_and(apart) {
+            return None;
+        }
         let placement = &self.groups[load].placement;
         let turned = |axis: [f64; 3]| placement.rotation * Vec3::from(axis);
         let along = |a: &Vec3, b: &Vec3| a.cross(b).norm() <= ALIKE * a.norm() * b.norm();

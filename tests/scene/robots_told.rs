@@ -350,6 +350,10 @@ fn motions_that_nothing_tells_apart_are_refused() {
         &chain("0 0 1", 0.0),
         &["joint \"j0\"", "\"mid\"", "joint \"j\""],
     );
+    let end = "</joint>\n\n</robot>";
+    let led = chain("0 0 1", 0.0).replace(end, &format!("<mimic joint=\"j0\"/>{end}"));
+    assert!(led.contains("mimic"));
+    read(&led, &Robot::default()).unwrap();
     // Axes beside each other, or across, are two motions.
     for text in [chain("0 0 1", 0.3), chain("0 1 0", 0.0)] {
         let scene = read(&text, &Robot::default()).unwrap();

@@ -246,6 +246,10 @@ pub(crate) fn assemble(
         &changes,
         folder,
     )?;
+    #[cfg(feature = "urdf")]
+    if scene.fluid.density > 0.0 {
+        water.warnings.extend(scene.imports.warnings());
+    }
     system.coupling = water.coupling.clone();
     water.reasons.extend(contact::stand_in(scene, choices));
     if let Some(given) = &scene.contact {

@@ -53,7 +53,7 @@ enum Command {
     Gradcheck(gradcheck::Arguments),
     /// Measure time against error over fidelities, methods, resolutions, integrators and time steps.
     Tradeoff(tradeoff::Arguments),
-    /// Say what a robot in a URDF or MJCF file comes to: its tree, weight against buoyancy, meshes that were replaced, and what wasn't used.
+    /// Say what a robot in a URDF or MJCF file, or those of a scene, come to: its tree, weight against buoyancy, meshes that were replaced, and what wasn't used.
     Inspect(inspect::Arguments),
     /// Say whether a mesh can be simulated: what is wrong, where, and how to mend it.
     CheckMesh(check_mesh::Arguments),

@@ -10,8 +10,8 @@ use super::overlap::{declare, untangle};
 use super::pieces::Meshes;
 use super::read::read;
 use super::report::{BodyReport, FoldedReport, Report};
-use super::surface::{Surface, Wet, pose};
-use super::tree::{Group, groups, joint_place, link_place};
+use super::surface::{Immersed, Surface, pose};
+use super::tree::{Group, groups, link_place};
 use crate::geometry::MassProperties;
 use crate::multibody::Joint;
 use crate::shape::Shape;
@@ -22,8 +22,6 @@ use std::path::Path;
 
 /// A moment of inertia, in that of a point mass at the edge of what the link is, under which it is implausible.
 const THIN: f64 = 1e-4;
-/// Sine of the angle under which two axes are one.
-const ALIKE: f64 = 1e-3;
 
 /// A body of a robot, in the frame of its first link.
 #[derive(Clone, Debug)]
@@ -101,17 +99,14 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     for group in &groups {
         group.parts.iter().for_each(|p| tops[p.link] = group.top());
     }
+    let chosen = |top: usize| options.links.get(&file.robot.links[top].name);
     for (link, top) in tops.into_iter().enumerate() {
-        let chosen = options.links.get(&file.robot.links[top].name);
-        let (inertial, mended) = of_link(&file, link, top, chosen)?;
+        let inertial = of_link(&file, link, chosen(top))?;
         own.push(chosen_mass(&file, link, inertial, options)?);
-        if let Some(mended) = mended {
-            report.note(mended);
-        }
     }
     let inertials: Vec<Inertial> = (groups.iter())
-        .map(|g| of_group(g, |link| own[link]))
-        .collect();
+        .map(|g| of_group(&file, g, &own, chosen(g.top()), &mut report))
+        .collect::<Result<_>>()?;
     let base = base(&file, &groups, &inertials, options, &mut report);
     let bodies = Bodies {
         file: &file,
@@ -131,7 +126,7 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
     let mut meshes = Meshes::new(&file, options);
     let mut wets = Vec::with_capacity(groups.len());
     for (g, group) in groups.iter().enumerate() {
-        let wet = Wet::of_group(&mut meshes, group, &names[g], options, &mut report)?;
+        let wet = Immersed::of_group(&mut meshes, group, &names[g], options, &mut report)?;
         wets.push(bodies.dry_if_massless(g, wet, &mut report));
     }
     untangle(&mut wets, &names, &parents, &poses, &mut report)?;
@@ -190,21 +185,21 @@ fn base(
 }
 
 /// The bodies of a file, as far as they are known.
-struct Bodies<'b> {
-    file: &'b File,
-    options: &'b Options,
-    groups: &'b [Group],
-    moves: &'b [Option<Moves>],
-    inertials: &'b [Inertial],
+pub(super) struct Bodies<'b> {
+    pub file: &'b File,
+    pub options: &'b Options,
+    pub groups: &'b [Group],
+    pub moves: &'b [Option<Moves>],
+    pub inertials: &'b [Inertial],
     fixed: bool,
 }
 
 impl Bodies<'_> {
-    fn name(&self, g: usize) -> &str {
+    pub fn name(&self, g: usize) -> &str {
         &self.file.robot.links[self.groups[g].top()].name
     }
 
-    fn joint(&self, g: usize) -> Joint {
+    pub fn joint(&self, g: usize) -> Joint {
         match (&self.moves[g], self.fixed) {
             (Some(moves), _) => moves.joint,
             (None, true) => Joint::Fixed,
@@ -212,120 +207,13 @@ impl Bodies<'_> {
         }
     }
 
-    fn density(&self, g: usize) -> Option<f64> {
+    pub fn density(&self, g: usize) -> Option<f64> {
         self.options.links.get(self.name(g))?.density
     }
 
-    fn has_inertia_chosen(&self, g: usize) -> bool {
+    pub fn has_inertia_chosen(&self, g: usize) -> bool {
         let choice = self.options.links.get(self.name(g));
         choice.is_some_and(|choice| choice.has("inertia"))
-    }
-
-    /// Whether a joint moves it that it alone doesn't give any inertia to.
-    fn is_massless(&self, g: usize) -> bool {
-        self.joint(g).velocities() > 0 && self.inertials[g].is_none() && self.density(g).is_none()
-    }
-
-    /// Refuses what moves and has no inertia.
-    fn check_massless(&self) -> Result<()> {
-        let refused = |g: usize, what: String, remedy: &str| {
-            let place = match self.groups[g].joint {
-                Some(joint) => joint_place(self.file, joint),
-                None => link_place(self.file, self.groups[g].top()),
-            };
-            Err(Error::input(place, what, remedy))
-        };
-        let remedy = "give it a mass and an inertia (<inertial>, or `density` for the link), or make its joint fixed";
-        for g in 0..self.groups.len() {
-            if self.is_massless(g) {
-                let what = format!("moves link {:?} without mass", self.name(g));
-                let carried = |b: usize| {
-                    let mut up = std::iter::successors(Some(b), |b| self.groups[*b].parent);
-                    b != g && up.any(|b| b == g)
-                };
-                let mut above = (0..self.groups.len()).filter(|b| carried(*b));
-                if !above.any(|b| !self.inertials[b].is_none() || self.density(b).is_some()) {
-                    return refused(g, what, remedy);
-                }
-                if let Some(parent) = self.massless_alike(g) {
-                    let parent = self.name(parent);
-                    let chain = format!(
-                        "{what}, as does the joint of link {parent:?} without mass along or about the same axis"
-                    );
-                    return refused(g, chain, remedy);
-                }
-            }
-            if self.is_point(g) {
-                let what = format!(
-                    "turns link {:?}, whose inertia about it is zero",
-                    self.name(g)
-                );
-                return refused(g, what, remedy);
-            }
-        }
-        Ok(())
-    }
-
-    /// Of massless links in a row, of which it is one: another whose joint moves along or about the same axis, or any that has not one coordinate. What both carry
-    /// doesn't tell their motions apart.
-    fn massless_alike(&self, g: usize) -> Option<usize> {
-        let axis = |joint: &Joint| match joint {
-            Joint::Revolute { axis } => Some((true, Vec3::from(*axis))),
-            Joint::Prismatic { axis } => Some((false, Vec3::from(*axis))),
-            _ => None,
-        };
-        let own = axis(&self.joint(g));
-        // From the frame of the link's joint to that of the one above.
-        let mut turn = self.groups[g].placement.rotation;
-        let mut at = self.groups[g].parent;
-        while let Some(p) = at.filter(|p| self.is_massless(*p)) {
-            let other = axis(&self.joint(p));
-            let apart = match (own, other) {
-                (Some((turns, a)), Some((others, b))) => {
-                    let a = turn * a;
-                    turns != others || a.cross(&b).norm() > ALIKE * a.norm() * b.norm()
-                }
-                _ => false,
-            };
-            if !apart {
-                return Some(p);
-            }
-            turn = self.groups[p].placement.rotation * turn;
-            at = self.groups[p].parent;
-        }
-        None
-    }
-
-    /// Whether it has mass, and no inertia about an axis that its joint turns it about, nor anything on it.
-    fn is_point(&self, g: usize) -> bool {
-        let own = &self.inertials[g];
-        let chosen = self.density(g).is_some() || self.has_inertia_chosen(g);
-        if own.mass == 0.0 || own.inertia.norm() > 0.0 || chosen {
-            return false;
-        }
-        if self.groups.iter().any(|other| other.parent == Some(g)) {
-            return false;
-        }
-        match self.joint(g) {
-            Joint::Fixed | Joint::Prismatic { .. } => false,
-            Joint::Revolute { axis } => {
-                let axis = Vec3::from(axis);
-                axis.cross(&own.center).norm() <= 1e-12 * axis.norm() * own.center.norm()
-            }
-            _ => true,
-        }
-    }
-
-    /// The water sees no body that moves without mass.
-    fn dry_if_massless(&self, g: usize, wet: Wet, report: &mut Report) -> Wet {
-        if wet.surface.is_none() || !self.is_massless(g) {
-            return wet;
-        }
-        report.note(format!(
-            "body {:?} is dry: it moves and has no mass; give it one to put it in the water",
-            self.name(g)
-        ));
-        Wet::dry("it has no mass")
     }
 
     /// Where all bodies are at the start, in the root's frame.
@@ -338,8 +226,20 @@ impl Bodies<'_> {
             };
             let model = self.joint(g).model();
             let mut q = model.origin();
-            if let (Some(at), [q]) = (self.moves[g].as_ref().and_then(|m| m.start), &mut q[..]) {
-                *q = at;
+            if let Some(moves) = &self.moves[g] {
+                match (
+                    self.options.driven.get(&moves.name),
+                    moves.start,
+                    &mut q[..],
+                ) {
+                    (Some(at), _, q) if at.len() == q.len() => q.copy_from_slice(at),
+                    (None, Some(at), [q]) => *q = at,
+                    _ => {}
+                }
+                // The joint before it that stands for its zero is of its kind.
+                if let ([q], Some(zero)) = (&mut q[..], self.options.zeroed.get(&moves.name)) {
+                    *q += zero;
+                }
             }
             let placed = poses[parent].compose(&pose(&group.placement));
             poses.push(placed.compose(&model.pose(&q)));
@@ -358,7 +258,7 @@ impl Bodies<'_> {
         }
     }
 
-    fn made(&self, wets: &[Wet], overlaps: &[bool]) -> Result<Vec<RobotBody>> {
+    fn made(&self, wets: &[Immersed], overlaps: &[bool]) -> Result<Vec<RobotBody>> {
         let mut made = Vec::with_capacity(self.groups.len());
         for (g, (group, wet)) in self.groups.iter().zip(wets).enumerate() {
             let density = self.density(g);
@@ -397,7 +297,7 @@ impl Bodies<'_> {
     fn tell(
         &self,
         made: &[RobotBody],
-        wets: &[Wet],
+        wets: &[Immersed],
         poses: &[Pose],
         base: Base,
         report: &mut Report,
@@ -411,11 +311,22 @@ impl Bodies<'_> {
                 (Some(density), Some(seen)) => (density * seen.volume, seen.centroid),
                 _ => (self.inertials[g].mass, self.inertials[g].center),
             };
+            let chosen = self.options.links.get(self.name(g));
+            let center = self.center_chosen(g).unwrap_or(center);
             mass += own;
             of_mass += own * poses[g].apply(&center);
+            let displaced = chosen.and_then(|c| c.volume);
+            let displaced = displaced.or(seen.as_ref().map(|s| s.volume));
+            let own_volume = displaced.unwrap_or(0.0);
+            // As a scene has it.
+            let buoyed = chosen.and_then(|c| c.center_of_buoyancy).map(Vec3::from);
+            let buoyed = buoyed.or(seen.as_ref().map(|s| s.centroid));
+            let buoyed = displaced.map(|_| buoyed.unwrap_or(center));
+            volume += own_volume;
+            if let Some(buoyed) = &buoyed {
+                of_volume += own_volume * poses[g].apply(buoyed);
+            }
             if let Some(seen) = &seen {
-                volume += seen.volume;
-                of_volume += seen.volume * poses[g].apply(&seen.centroid);
                 report.implausible.extend(self.implausible(g, wet, seen)?);
             }
             let links = self.groups[g].parts.iter();
@@ -428,11 +339,11 @@ impl Bodies<'_> {
                     .map(|part| self.file.robot.links[part.link].name.clone())
                     .collect(),
                 mass: own,
-                volume: seen.as_ref().map_or(0.0, |s| s.volume),
+                volume: own_volume,
                 weight: 0.0,
                 buoyancy: 0.0,
                 center_of_mass: center.into(),
-                center_of_buoyancy: seen.map(|s| s.centroid.into()),
+                center_of_buoyancy: buoyed.map(Into::into),
                 shape: wet.said.clone(),
                 pieces: wet.pieces.len(),
             });
@@ -444,9 +355,21 @@ impl Bodies<'_> {
         Ok(())
     }
 
+    /// The centre of mass that is chosen for it.
+    fn center_chosen(&self, g: usize) -> Option<Vec3> {
+        let chosen = self.options.links.get(self.name(g))?;
+        chosen.center_of_mass.map(Vec3::from)
+    }
+
     /// What of a body's inertia fits nothing of its size.
-    fn implausible(&self, g: usize, wet: &Wet, seen: &MassProperties) -> Result<Option<String>> {
-        let own = &self.inertials[g];
+    fn implausible(
+        &self,
+        g: usize,
+        wet: &Immersed,
+        seen: &MassProperties,
+    ) -> Result<Option<String>> {
+        let mut own = self.inertials[g];
+        own.center = self.center_chosen(g).unwrap_or(own.center);
         let chosen = self.density(g).is_some() || self.has_inertia_chosen(g);
         let Some(surface) = (wet.surface.as_ref()).filter(|_| own.mass > 0.0 && !chosen) else {
             return Ok(None);

@@ -16,8 +16,8 @@ pub(super) fn check_names(file: &File, options: &Options) -> Result<()> {
     let all = [
         ("links", &links, options.links.keys().collect::<Vec<_>>()),
         ("start", &joints, options.start.keys().collect()),
-        ("motions", &moving, options.driven.iter().collect()),
-        ("zeros", &moving, options.zeroed.iter().collect()),
+        ("motions", &moving, options.driven.keys().collect()),
+        ("zeros", &moving, options.zeroed.keys().collect()),
     ];
     for (key, known, given) in all {
         if let Some(bad) = given.iter().find(|name| !known.contains(&name.as_str())) {
@@ -46,7 +46,7 @@ pub(super) fn check_choices(file: &File, groups: &[Group], options: &Options) ->
                 "the joint follows {:?}: give the start of that one, or make it `mimic = \"independent\"`",
                 mimic.joint
             ),
-            None if options.driven.contains(&joint.name) => {
+            None if options.driven.contains_key(&joint.name) => {
                 "the joint is driven, and starts where its motion does: leave its start or its motion out".into()
             }
             None => continue,

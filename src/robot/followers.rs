@@ -92,6 +92,9 @@ fn start_within(
     options: &Options,
     report: &mut Report,
 ) -> Result<()> {
+    if options.driven.contains_key(&moves.name) {
+        return Ok(());
+    }
     let start = moves.start.unwrap_or(0.0);
     let Some([lower, upper]) = moves.limits.filter(|l| !(l[0]..=l[1]).contains(&start)) else {
         return Ok(());

@@ -2,6 +2,7 @@
 
 use super::file::File;
 use super::options::LinkChoice;
+use super::report::Report;
 use super::tree::{Group, link_place, placed};
 use crate::geometry::impossible_inertia;
 use crate::{Error, Result};
@@ -79,32 +80,70 @@ impl Inertial {
     }
 }
 
-/// Of a link, in its frame, and what was mended in it; `top` is the link whose frame its body has, and `chosen` what is chosen for that, which may stand in place of what the file says.
-pub(super) fn of_link(
-    file: &File,
-    link: usize,
-    top: usize,
-    chosen: Option<&LinkChoice>,
-) -> Result<(Inertial, Option<String>)> {
+/// xx, yy, zz, xy, xz, yz as the file gives them.
+fn six(file: &File, link: usize) -> [f64; 6] {
+    let i = &file.robot.links[link].inertial.inertia;
+    [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz]
+}
+
+/// Of a link, in its frame, as the file gives it; `chosen` is what is chosen for the link whose frame its body has, which may stand in place of what the file says.
+pub(super) fn of_link(file: &File, link: usize, chosen: Option<&LinkChoice>) -> Result<Inertial> {
     let given = &file.robot.links[link].inertial;
     let mass = given.mass.value;
     let i = &given.inertia;
-    let six = [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
-    let dense = chosen.is_some_and(|c| c.has("density"));
-    let turned = dense || chosen.is_some_and(|c| c.has("inertia"));
-    if mass < 0.0 && !dense {
+    if mass < 0.0 && !chosen.is_some_and(|c| c.has("density")) {
         return Err(Error::input(
             format!("{}: mass", link_place(file, link)),
             mass,
             "give zero (a massless link) or more, in kg",
         ));
     }
-    if let Some(why) = impossible_inertia(&six, SLACK).filter(|_| !turned) {
-        let remedy = match top == link {
+    let own = Inertial {
+        // Of a negative one nothing is used but that it is there.
+        mass: mass.abs(),
+        center: Vector3::zeros(),
+        inertia: Matrix3::new(
+            i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
+        ),
+    };
+    Ok(own.moved(&placed(&given.origin)))
+}
+
+/// Of all links of a group, in its frame, from each link's `own`; `chosen` is what is chosen for its body. What no distribution of mass has is mended where rounding may
+/// have made it, refused of the whole, and of a part that is nothing beside the others told.
+pub(super) fn of_group(
+    file: &File,
+    group: &Group,
+    own: &[Inertial],
+    chosen: Option<&LinkChoice>,
+    report: &mut Report,
+) -> Result<Inertial> {
+    let parts: Vec<Inertial> = (group.parts.iter())
+        .map(|part| own[part.link].moved(&part.at))
+        .collect();
+    // One link alone is as the file gives it, to the bit.
+    let mut whole = match parts[..] {
+        [one] => one,
+        _ => Inertial::together(&parts),
+    };
+    if chosen.is_some_and(|c| c.has("density") || c.has("inertia")) {
+        return Ok(whole);
+    }
+    let name = |link: usize| &file.robot.links[link].name;
+    let alone = |link: usize| impossible_inertia(&six(file, link), SLACK);
+    let links = group.parts.iter().map(|part| part.link);
+    let bad: Vec<usize> = links.filter(|link| alone(*link).is_some()).collect();
+    if let Some(why) = impossible_inertia(&whole.six(), SLACK) {
+        let link = bad.first().copied().unwrap_or(group.top());
+        let (six, why) = match alone(link) {
+            Some(why) => (six(file, link), why),
+            None => (whole.six(), why),
+        };
+        let remedy = match group.top() == link {
             true => "give the link a `density`, from which it follows".to_string(),
             false => format!(
                 "give link {:?}, whose body it is part of, a `density`, from which that body's follows",
-                file.robot.links[top].name
+                name(group.top())
             ),
         };
         return Err(Error::input(
@@ -113,35 +152,25 @@ pub(super) fn of_link(
             format!("{why}; correct it, or {remedy}"),
         ));
     }
-    let mut own = Inertial {
-        // Of a negative one nothing is used but that it is there.
-        mass: mass.abs(),
-        center: Vector3::zeros(),
-        inertia: Matrix3::new(
-            i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
-        ),
-    };
-    let mended = impossible_inertia(&six, 1e-9).filter(|_| !turned).map(|_| {
-        // As much on all moments: then the largest is the sum of the others.
-        let [a, b, c] = own.moments();
-        let missing = (c - a - b).max(-a);
-        own.inertia += Matrix3::identity() * missing;
-        format!(
-            "link {:?}: its inertia has the principal moments {a:?}, {b:?}, {c:?} kg m², which no distribution of mass has, by what rounding may do: {missing:.3e} was added to each",
-            file.robot.links[link].name
-        )
-    });
-    Ok((own.moved(&placed(&given.origin)), mended))
-}
-
-/// Of all links of a group, in its frame; `of` gives each link's own.
-pub(super) fn of_group(group: &Group, of: impl Fn(usize) -> Inertial) -> Inertial {
-    let parts: Vec<Inertial> = (group.parts.iter())
-        .map(|part| of(part.link).moved(&part.at))
-        .collect();
-    // One link alone is as the file gives it, to the bit.
-    match parts[..] {
-        [one] => one,
-        _ => Inertial::together(&parts),
+    if group.parts.len() > 1 {
+        for link in bad {
+            report.note(format!(
+                "link {:?}: its inertia, {:?} kg m² (xx, yy, zz, xy, xz, yz), is one that no distribution of mass has; that of body {:?}, which it is part of, can be, and is used",
+                name(link),
+                six(file, link),
+                name(group.top())
+            ));
+        }
     }
+    if impossible_inertia(&whole.six(), 1e-9).is_some() {
+        // As much on all moments: then the largest is the sum of the others.
+        let [a, b, c] = whole.moments();
+        let missing = (c - a - b).max(-a);
+        whole.inertia += Matrix3::identity() * missing;
+        report.note(format!(
+            "link {:?}: its inertia has the principal moments {a:?}, {b:?}, {c:?} kg m², which no distribution of mass has, by what rounding may do: {missing:.3e} was added to each",
+            name(group.top())
+        ));
+    }
+    Ok(whole)
 }

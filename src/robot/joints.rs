@@ -106,6 +106,7 @@ pub(super) fn moves(
         _ => None,
     };
     let limits = limits.filter(|_| !options.without_limits);
+    tell_unused(file, number, report);
     let start = start(file, number, axial, limits, options, report)?;
     Ok(Moves {
         name: given.name.clone(),
@@ -115,6 +116,32 @@ pub(super) fn moves(
         dynamics,
         mimic: None,
     })
+}
+
+/// Tells what a joint of its kind has no use for.
+fn tell_unused(file: &File, number: usize, report: &mut Report) {
+    let given = &file.robot.joints[number];
+    let (lower, upper) = (given.limit.lower, given.limit.upper);
+    let ranged = lower < upper && (lower.is_finite() || upper.is_finite());
+    let ranged = ranged && file.joints[number].has_range;
+    let losses = given.dynamics.as_ref();
+    let losses = losses.is_some_and(|d| d.damping != 0.0 || d.friction != 0.0);
+    let (kind, losses) = match given.joint_type {
+        JointType::Continuous => ("continuous", false),
+        JointType::Planar => ("planar", losses),
+        JointType::Floating => ("floating", losses),
+        _ => return,
+    };
+    let what = match (ranged, losses) {
+        (true, true) => "range (<limit>), damping and friction (<dynamics>)",
+        (true, false) => "range (<limit>)",
+        (false, true) => "damping and friction (<dynamics>)",
+        (false, false) => return,
+    };
+    report.note(format!(
+        "joint {:?} is {kind}, and moves without the {what} that the file gives it",
+        given.name
+    ));
 }
 
 fn plane(axis: &[f64; 3]) -> Option<Plane> {
@@ -138,7 +165,8 @@ fn follows(
     };
     // Of the leader, and of whom that follows, and so on.
     let mut leader = mimic.joint.as_str();
-    for _ in 0..=file.robot.joints.len() {
+    let mut passed = vec![name.as_str()];
+    loop {
         if leader == name {
             let given = match mimic.joint == *name {
                 true => "itself".to_string(),
@@ -149,6 +177,17 @@ fn follows(
                 "a joint follows another one, which has a coordinate of its own",
             );
         }
+        // Fixed joints among them aren't looked at for themselves.
+        if let Some(first) = passed.iter().position(|joint| *joint == leader) {
+            return wrong(
+                format!("joint {:?}, which leads to a circle", mimic.joint),
+                &format!(
+                    "the joints {:?} follow each other: take <mimic> away from one of them",
+                    &passed[first..]
+                ),
+            );
+        }
+        passed.push(leader);
         let Some(of) = file.robot.joints.iter().find(|j| j.name == leader) else {
             return wrong(format!("joint {leader:?}"), "there is no such joint");
         };
@@ -240,7 +279,7 @@ fn limits(file: &File, number: usize, report: &mut Report) -> Result<Option<[f64
     Ok(None)
 }
 
-/// Where a joint starts: as chosen, else at zero, else just inside its limits.
+/// Where a joint starts: as chosen, else where its motion does, else at zero, else just inside its limits.
 fn start(
     file: &File,
     number: usize,
@@ -262,6 +301,10 @@ fn start(
             return Err(Error::input(place, q, remedy));
         }
         return Ok(Some(q));
+    }
+    // What is driven has no limits.
+    if let Some([q]) = options.driven.get(name).map(Vec::as_slice) {
+        return Ok(Some(*q));
     }
     let own = file.extras.get(name).map_or(0.0, |extra| extra.start);
     let Some([lower, upper]) = limits.filter(|[lower, upper]| !(*lower..=*upper).contains(&own))

@@ -11,6 +11,8 @@ mod followers;
 mod hull;
 mod inertia;
 mod joints;
+mod kept;
+mod massless;
 mod mjcf;
 mod options;
 mod overlap;

@@ -58,6 +58,9 @@ pub(crate) struct LinkChoice {
     pub mass: Option<f64>,
     pub density: Option<f64>,
     pub keep: bool,
+    pub center_of_mass: Option<[f64; 3]>,
+    pub volume: Option<f64>,
+    pub center_of_buoyancy: Option<[f64; 3]>,
     /// What is chosen of the body that the link's frame and name are of, `density` too.
     pub of_body: Vec<&'static str>,
 }
@@ -80,9 +83,9 @@ pub(crate) struct Options {
     pub followers: Followers,
     pub without_limits: bool,
     pub start: BTreeMap<String, f64>,
-    /// Joints that motions drive.
-    pub driven: Vec<String>,
-    /// Joints that get an offset.
-    pub zeroed: Vec<String>,
+    /// Joints that motions drive, and where those begin.
+    pub driven: BTreeMap<String, Vec<f64>>,
+    /// Joints that get an offset, and that.
+    pub zeroed: BTreeMap<String, f64>,
     pub links: BTreeMap<String, LinkChoice>,
 }

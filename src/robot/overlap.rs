@@ -6,7 +6,7 @@
 
 use super::hull::{fine_half, half, least_overlap};
 use super::report::Report;
-use super::surface::{Surface, Wet};
+use super::surface::{Immersed, Surface};
 use crate::Result;
 use crate::geometry::{Gaps, Other, Share, Solid, TriMesh};
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -29,7 +29,7 @@ struct Standing {
 }
 
 impl Standing {
-    fn of(wets: &[Wet]) -> Result<Self> {
+    fn of(wets: &[Immersed]) -> Result<Self> {
         let (mut meshes, mut solids) = (Vec::new(), Vec::new());
         for wet in wets {
             let surface = wet.surface.as_ref();
@@ -67,7 +67,7 @@ impl Standing {
 }
 
 /// The nearest body with a surface that carries each.
-fn carriers(wets: &[Wet], parents: &[Option<usize>]) -> Vec<Option<usize>> {
+fn carriers(wets: &[Immersed], parents: &[Option<usize>]) -> Vec<Option<usize>> {
     let of = |b: usize| {
         let mut carrying = std::iter::successors(parents[b], |b| parents[*b]);
         carrying.find(|b| wets[*b].surface.is_some())
@@ -86,7 +86,7 @@ struct Bodies<'b> {
 
 /// Parts bodies at these poses where they may not overlap, and says which ones are to be declared to overlap what carries them.
 pub(super) fn untangle(
-    wets: &mut [Wet],
+    wets: &mut [Immersed],
     names: &[String],
     parents: &[Option<usize>],
     poses: &[Pose],
@@ -109,7 +109,7 @@ pub(super) fn untangle(
 
 /// Which bodies touch or overlap the one that carries them, or nearly so; whatever else still overlaps becomes dry.
 pub(super) fn declare(
-    wets: &mut [Wet],
+    wets: &mut [Immersed],
     names: &[String],
     parents: &[Option<usize>],
     poses: &[Pose],
@@ -144,23 +144,23 @@ pub(super) fn declare(
 }
 
 fn dry(
-    wets: &mut [Wet],
+    wets: &mut [Immersed],
     names: &[String],
     (a, b): (usize, usize),
     small: usize,
     report: &mut Report,
 ) {
     let other = if small == a { b } else { a };
-    report.note(format!(
+    report.warn(format!(
         "body {:?} is dry: it lies in body {:?}, and no plane parts the two without taking half of one",
         names[small], names[other]
     ));
-    wets[small] = Wet::dry(format!("it lies in body {:?}", names[other]));
+    wets[small] = Immersed::dry(format!("it lies in body {:?}", names[other]));
 }
 
 impl Bodies<'_> {
     /// Parts all pairs that need it once; whether there were any. In the last round bodies become dry instead.
-    fn part_all(&self, wets: &mut [Wet], last: bool, report: &mut Report) -> Result<bool> {
+    fn part_all(&self, wets: &mut [Immersed], last: bool, report: &mut Report) -> Result<bool> {
         let mut standing = Standing::of(wets)?;
         let carriers = carriers(wets, self.parents);
         let mut any = false;
@@ -201,7 +201,7 @@ impl Bodies<'_> {
     /// Cuts two bodies apart, or, if they are joined, the smaller one until they share no more than may be; whether enough is left of both.
     fn part(
         &self,
-        wets: &mut [Wet],
+        wets: &mut [Immersed],
         standing: &Standing,
         (a, b): (usize, usize),
         joined: bool,
@@ -278,14 +278,14 @@ impl Bodies<'_> {
     }
 
     /// Says what was cut off.
-    fn tell_cuts(&self, wets: &mut [Wet], report: &mut Report) -> Result<()> {
+    fn tell_cuts(&self, wets: &mut [Immersed], report: &mut Report) -> Result<()> {
         for (b, wet) in wets.iter_mut().enumerate() {
             let Some(surface) = &wet.surface else {
                 continue;
             };
             let left = surface.mesh()?.mass_properties().volume / self.whole[b];
             if left < 1.0 - 1e-6 {
-                report.note(format!(
+                report.warn(format!(
                     "body {:?}: {:.1} % of its hull lay in other bodies and was cut off by a plane",
                     self.names[b],
                     100.0 * (1.0 - left)
@@ -298,7 +298,7 @@ impl Bodies<'_> {
 }
 
 /// The part of a convex body where `normal`·x ≤ `level`, its pieces for contact with it.
-fn cut(wet: &Wet, normal: &Vec3, level: f64) -> Result<Option<Wet>> {
+fn cut(wet: &Immersed, normal: &Vec3, level: f64) -> Result<Option<Immersed>> {
     type Half = fn(&TriMesh, &Vec3, f64) -> Option<TriMesh>;
     let convex = |surface: &Surface, half: Half| -> Result<Option<Surface>> {
         let mesh = surface.mesh()?;
@@ -321,7 +321,7 @@ fn cut(wet: &Wet, normal: &Vec3, level: f64) -> Result<Option<Wet>> {
         // Few faces are enough to touch with.
         pieces.push(convex(surface, half)?.unwrap_or_else(|| left.clone()));
     }
-    Ok(Some(Wet {
+    Ok(Some(Immersed {
         surface: Some(left),
         pieces,
         said: wet.said.clone(),

@@ -50,6 +50,8 @@ impl Folders {
     fn candidates(&self, name: &str) -> Vec<PathBuf> {
         let scheme = |prefix: &str| name.strip_prefix(prefix);
         if let Some(rest) = scheme("package://").or(scheme("model://")) {
+            // Some exporters write `package:///PACKAGE/…`.
+            let rest = rest.trim_start_matches('/');
             let (package, inner) = rest.split_once('/').unwrap_or((rest, ""));
             if package.is_empty() || inner.is_empty() {
                 return Vec::new();

@@ -1,9 +1,10 @@
 //! The file: its text as XML, what of it is read, and its typed form, which for MJCF is that of URDF as well ([`mjcf`]).
 //!
 //! `urdf-rs` gives the typed form. It passes over what it doesn't know and says neither where an error is nor what was left out, so the text
-//! is first looked through as XML: what can't be is refused there with line and name, and what isn't used is listed.
+//! is first looked through as XML: what can't be is refused there with line and name, what isn't used is listed, and what is used alone is handed on ([`kept`](mod@super::kept)).
 
 use super::file::{File, JointText, LARGEST, check_depth, guarded, parse_error};
+use super::kept::kept;
 use super::mjcf;
 use super::report::Unused;
 use crate::{Error, Result};
@@ -59,7 +60,9 @@ fn parse(path: &Path, text: &str) -> Result<File> {
         }
     });
     let joints = joints.collect();
-    let robot = guarded(path, "a URDF file", || urdf_rs::read_from_string(text))?;
+    let text = kept(&document.root_element(), look.version)
+        .map_err(|e| parse_error(path, format!("can't be written anew: {e}")))?;
+    let robot = guarded(path, "a URDF file", || urdf_rs::read_from_string(&text))?;
     let unused = look.unused.into_iter();
     Ok(File {
         joints,
@@ -91,7 +94,7 @@ fn version(robot: &Node) -> [u32; 2] {
 }
 
 /// The attributes that are read of an element, by its parent's name and its own; none if the element isn't read.
-fn read_attributes(parent: &str, tag: &str) -> Option<&'static [&'static str]> {
+pub(super) fn read_attributes(parent: &str, tag: &str) -> Option<&'static [&'static str]> {
     Some(match (parent, tag) {
         ("", "robot") => &["name", "version"],
         ("robot", "link") => &["name"],
@@ -115,7 +118,7 @@ fn read_attributes(parent: &str, tag: &str) -> Option<&'static [&'static str]> {
 }
 
 /// The attributes that an element must have.
-fn needed_attributes(tag: &str, version: [u32; 2]) -> &'static [&'static str] {
+pub(super) fn needed_attributes(tag: &str, version: [u32; 2]) -> &'static [&'static str] {
     match tag {
         "limit" if version >= [1, 2] => &[],
         "link" => &["name"],
@@ -245,12 +248,16 @@ impl Look<'_, '_> {
         let read = read_attributes(parent, tag).filter(|_| own);
         let Some(attributes) = read else {
             let what = match parent {
-                "geometry" => {
+                "geometry" if own => {
                     let known = "known are box, cylinder, sphere, capsule and mesh";
                     return Err(self.wrong(&node, format!("<{tag}> is no geometry; {known}")));
                 }
                 "robot" => format!("<{tag}>"),
                 _ => format!("<{tag}> of <{parent}>"),
+            };
+            let what = match own || read_attributes(parent, tag).is_none() {
+                true => what,
+                false => format!("{what}, of another namespace"),
             };
             self.note(what, &node);
             return Ok(());
@@ -263,6 +270,10 @@ impl Look<'_, '_> {
         }
         for attribute in node.attributes() {
             let name = attribute.name();
+            if attribute.namespace().is_some() {
+                self.note(format!("{name} of <{tag}>, of another namespace"), &node);
+                continue;
+            }
             if name == "quat_xyzw" && self.version < [1, 1] && attributes.contains(&name) {
                 let why = "which only versions from 1.1 have: <robot version=\"1.1\">";
                 self.note(format!("{name} of <{tag}>, {why}"), &node);
@@ -275,7 +286,27 @@ impl Look<'_, '_> {
                 self.note(format!("{name} of <{tag}>"), &node);
             }
         }
+        self.check_turn(&node)?;
         self.children(&node)
+    }
+
+    /// An orientation is given once, and by what is one.
+    fn check_turn(&self, node: &Node) -> Result<()> {
+        let given = node.attribute("quat_xyzw");
+        let Some(quaternion) = given.filter(|_| self.version >= [1, 1]) else {
+            return Ok(());
+        };
+        let tag = node.tag_name().name();
+        let what = if node.has_attribute("rpy") {
+            format!("<{tag}>: rpy and quat_xyzw both turn it; leave one out")
+        } else if (quaternion.split_whitespace()).all(|x| x.parse() == Ok(0.0)) {
+            format!(
+                "<{tag}>: quat_xyzw = {quaternion:?}: a rotation's quaternion can't be zero; no rotation is 0 0 0 1"
+            )
+        } else {
+            return Ok(());
+        };
+        Err(self.wrong(node, what))
     }
 
     fn children(&mut self, node: &Node) -> Result<()> {
@@ -291,16 +322,19 @@ impl Look<'_, '_> {
             _ => true,
         };
         let inner: Vec<Node> = node.children().filter(Node::is_element).collect();
-        for (i, child) in inner.iter().enumerate() {
+        let namespace = node.tag_name().namespace();
+        let own = (inner.iter()).filter(|child| child.tag_name().namespace() == namespace);
+        let own: Vec<&Node> = own.collect();
+        for (i, child) in own.iter().enumerate() {
             let name = child.tag_name().name();
-            let again = (inner[..i].iter()).any(|c| c.tag_name() == child.tag_name());
+            let again = (own[..i].iter()).any(|c| c.tag_name() == child.tag_name());
             let known = read_attributes(tag, name).is_some();
             if (again && once(name) && known) || (tag == "geometry" && i > 0) {
                 let what = format!("<{name}> is one too many in <{tag}>; leave one");
                 return Err(self.wrong(child, what));
             }
         }
-        if tag == "geometry" && inner.is_empty() {
+        if tag == "geometry" && own.is_empty() {
             let what = "<geometry> is empty; give a box, cylinder, sphere, capsule or mesh";
             return Err(self.wrong(node, what.into()));
         }

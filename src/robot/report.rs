@@ -108,9 +108,20 @@ pub struct Report {
     pub notes: Vec<String>,
     /// What of the file was not used.
     pub unused: Vec<Unused>,
+    /// Of the notes, those by which the water sees less of a body than the file has.
+    #[serde(skip)]
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Report {
+    /// Adds a note that a run tells as well.
+    pub(super) fn warn(&mut self, what: String) {
+        if !self.warnings.contains(&what) {
+            self.warnings.push(what.clone());
+        }
+        self.note(what);
+    }
+
     /// Adds what was chosen or replaced.
     pub(super) fn note(&mut self, what: String) {
         if !self.notes.contains(&what) {
@@ -118,7 +129,6 @@ impl Report {
         }
     }
 
-    /// Adds a joint whose damping and friction aren't used.
     /// Weights and buoyancies in such water and gravity (its magnitude).
     pub(crate) fn weigh(&mut self, density: f64, gravity: f64) {
         (self.density, self.gravity) = (density, gravity);
@@ -132,13 +142,28 @@ impl Report {
         self.buoyancy = density * self.volume * gravity;
     }
 
-    /// How deep in the tree a body is.
-    fn depth(&self, body: &BodyReport) -> usize {
-        let parent = |b: &BodyReport| {
+    /// A body and those that carry it, up to the root.
+    fn above<'r>(&'r self, body: &'r BodyReport) -> impl Iterator<Item = &'r BodyReport> {
+        std::iter::successors(Some(body), |b| {
             let name = b.parent.as_ref()?;
             self.bodies.iter().find(|o| o.body == *name)
-        };
-        std::iter::successors(Some(body), |b| parent(b)).count() - 1
+        })
+    }
+
+    /// How deep in the tree a body is.
+    fn depth(&self, body: &BodyReport) -> usize {
+        self.above(body).count() - 1
+    }
+
+    /// By how much what isn't fixed to the world is lighter than its water, N, and whether anything that has weight or buoyancy is fixed to it.
+    fn lift(&self) -> (f64, bool) {
+        let (fixed, moving): (Vec<_>, Vec<_>) =
+            (self.bodies.iter()).partition(|body| self.above(body).all(|b| b.kind == "fixed"));
+        let lift = moving.iter().map(|b| b.buoyancy - b.weight).sum();
+        (
+            lift,
+            fixed.iter().any(|b| b.buoyancy > 0.0 || b.weight > 0.0),
+        )
     }
 }
 
@@ -186,16 +211,20 @@ impl fmt::Display for Report {
                 writeln!(f, "{indent}  with {}", body.links[1..].join(", "))?;
             }
         }
-        let less = self.buoyancy - self.weight;
+        let (lift, fixed) = self.lift();
+        let of = match fixed {
+            true => "what isn't fixed to the world ",
+            false => "",
+        };
         write!(
             f,
-            "all: {:.5} kg, weight {:.4} N, {:.4e} m³, buoyancy {:.4} N: {} by {:.4} N; centre of mass {} m",
+            "all: {:.5} kg, weight {:.4} N, {:.4e} m³, buoyancy {:.4} N: {of}{} by {:.4} N; centre of mass {} m",
             self.mass,
             self.weight,
             self.volume,
             self.buoyancy,
-            if less < 0.0 { "sinks" } else { "rises" },
-            less.abs(),
+            if lift < 0.0 { "sinks" } else { "rises" },
+            lift.abs(),
             point(&self.center_of_mass)
         )?;
         if let Some(center) = &self.center_of_buoyancy {

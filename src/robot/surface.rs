@@ -6,9 +6,9 @@ use super::options::Options;
 use super::pieces::{Form, Meshes, Piece, moved};
 use super::report::Report;
 use super::tree::Group;
-use crate::Result;
 use crate::geometry::{MassProperties, Solid, TriMesh};
 use crate::shape::{Shape, build, solid};
+use crate::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use nalgebra::Isometry3;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub(super) enum Surface {
 }
 
 /// What a body is in water and for contact.
-pub(super) struct Wet {
+pub(super) struct Immersed {
     /// None of a dry body.
     pub surface: Option<Surface>,
     /// Convex pieces for contact; none where the surface itself will do.
@@ -82,7 +82,7 @@ impl Surface {
     }
 }
 
-impl Wet {
+impl Immersed {
     pub fn dry(said: impl Into<String>) -> Self {
         Self {
             surface: None,
@@ -138,7 +138,7 @@ impl Wet {
                 let placed = TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec())?;
                 let most = options.faces.unwrap_or(FACES);
                 let fewer = match placed.faces().len() > 2 * most {
-                    true => placed.coarsened(most),
+                    true => coarser(&placed, most),
                     false => Ok(placed),
                 };
                 match fewer {
@@ -156,15 +156,24 @@ impl Wet {
                             pieces: pieces.into_iter().collect(),
                         });
                     }
-                    Err(_) => format!("it can't be told by {most} faces"),
+                    Err(error) => {
+                        let why = match error {
+                            Error::Mesh { problem, .. } => problem,
+                            other => other.to_string(),
+                        };
+                        let faces = mesh.faces().len();
+                        format!(
+                            "it is closed, but has {faces} faces, and with about {most} (`faces`) it would be no surface: {why}"
+                        )
+                    }
                 }
             }
-            Err(why) => why,
+            Err(why) => format!("it isn't a closed surface: {why}"),
         };
         let made = Self::of_pieces(meshes, std::slice::from_ref(piece), name, options, report)?;
         if made.surface.is_some() {
             report.note(format!(
-                "body {name:?}: the convex hull of its mesh stands for it, since that isn't a closed surface: {why}"
+                "body {name:?}: the convex hull of its mesh stands for it, since {why}"
             ));
         }
         Ok(made)
@@ -207,7 +216,7 @@ impl Wet {
             }
         };
         let Some(whole) = whole else {
-            report.note(format!(
+            report.warn(format!(
                 "body {name:?} is dry: its geometry has no volume, not even its convex hull"
             ));
             return Ok(Self::dry("its geometry has no volume"));
@@ -255,6 +264,18 @@ impl Wet {
             self.said = format!("{}, {} faces", self.said, mesh.faces().len());
         }
     }
+}
+
+/// A mesh with about so many faces, or with a few times as many where it would be no surface with so few.
+fn coarser(mesh: &TriMesh, most: usize) -> Result<TriMesh> {
+    let first = mesh.coarsened(most);
+    if first.is_ok() {
+        return first;
+    }
+    let more = [2 * most, 4 * most].into_iter();
+    let mut more = more.filter(|more| *more < mesh.faces().len());
+    let found = more.find_map(|more| mesh.coarsened(more).ok());
+    found.map_or(first, Ok)
 }
 
 fn hull_name(body: &str) -> String {

@@ -1,7 +1,7 @@
 //! The tree of links, and what moves together: links at fixed joints fold into what carries them.
 
 use super::file::File;
-use super::options::Options;
+use super::options::{Base, Options};
 use crate::{Error, Result};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::collections::HashMap;
@@ -86,6 +86,7 @@ pub(super) fn groups(file: &File, options: &Options) -> Result<Vec<Group>> {
     for of in &mut children {
         of.sort_by_key(|link| carried[*link].map(|(joint, _)| joint));
     }
+    let still = stands_still(file, options, root, &children, &carried);
     let mut groups: Vec<Group> = Vec::new();
     let mut seen = 0;
     // Link, the group that its parent is in, and that parent's place there.
@@ -99,7 +100,10 @@ pub(super) fn groups(file: &File, options: &Options) -> Result<Vec<Group>> {
             None => origin,
         };
         let kept = options.links.get(&robot.links[link].name);
+        // What stands in the world is no one thing with what else does.
+        let alone = still && above.is_some_and(|(group, _)| group == 0) && has_geometry(file, link);
         let folds = joint.is_some_and(|j| robot.joints[j].joint_type == JointType::Fixed)
+            && !alone
             && !kept.is_some_and(|choice| choice.keep);
         let (group, at) = match above {
             Some((group, _)) if folds => {
@@ -126,6 +130,47 @@ pub(super) fn groups(file: &File, options: &Options) -> Result<Vec<Group>> {
         return Err(looped(file, &carried));
     }
     Ok(groups)
+}
+
+fn has_geometry(file: &File, link: usize) -> bool {
+    let link = &file.robot.links[link];
+    !(link.collision.is_empty() && link.visual.is_empty())
+}
+
+/// Whether the root is but a place in the world: without mass and geometry of its own, and fixed, by choice, by its name or as nothing that is fixed to it has a mass.
+fn stands_still(
+    file: &File,
+    options: &Options,
+    root: usize,
+    children: &[Vec<usize>],
+    carried: &[Option<(usize, usize)>],
+) -> bool {
+    let robot = &file.robot;
+    let massless = |link: usize| {
+        let given = &robot.links[link].inertial;
+        let i = &given.inertia;
+        [given.mass.value, i.ixx, i.iyy, i.izz] == [0.0; 4]
+    };
+    if !massless(root) || has_geometry(file, root) {
+        return false;
+    }
+    if let Some(base) = options.base {
+        return base == Base::Fixed;
+    }
+    if robot.links[root].name == "world" {
+        return true;
+    }
+    let is_fixed = |link: &usize| {
+        carried[*link].is_some_and(|(joint, _)| robot.joints[joint].joint_type == JointType::Fixed)
+    };
+    let mut open = vec![root];
+    while let Some(link) = open.pop() {
+        if !massless(link) {
+            return false;
+        }
+        open.extend(children[link].iter().copied().filter(is_fixed));
+    }
+    true
 }
 
 /// The joint and link that carry each link.

@@ -11,6 +11,8 @@
 //! # Ok::<(), hydrograd::Error>(())
 //! ```
 
+#[cfg(feature = "urdf")]
+use super::Imports;
 use super::{
     Body, CollisionPiece, Drag, Fluid, Initial, Joint, Motion, Placement, Preset, Refinement,
     Scene, Shape, Wall,
@@ -51,6 +53,8 @@ impl Scene {
             bodies: Vec::new(),
             #[cfg(feature = "urdf")]
             robots: Vec::new(),
+            #[cfg(feature = "urdf")]
+            imports: Imports::default(),
             forces: Vec::new(),
             sites: Vec::new(),
             initial: Initial::default(),

@@ -9,6 +9,8 @@ mod carriers;
 mod contact;
 mod file;
 mod force;
+#[cfg(feature = "urdf")]
+mod imports;
 mod joint;
 mod mimic;
 mod motion;
@@ -35,6 +37,8 @@ pub use force::{
     Coefficients, Current, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Tendon, Thruster,
     WATER_VISCOSITY,
 };
+#[cfg(feature = "urdf")]
+pub use imports::Imports;
 pub use mimic::Mimic;
 pub use origin::Origin;
 pub use passive::Passive;
@@ -83,6 +87,10 @@ pub struct Scene {
     #[cfg(feature = "urdf")]
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<Robot>,
+    /// What came of the robots that it has.
+    #[cfg(feature = "urdf")]
+    #[serde(skip)]
+    pub imports: Imports,
     /// Forces between bodies, beside those that bodies have of their own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<Force>,

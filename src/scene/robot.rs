@@ -80,7 +80,8 @@ impl RobotLink {
 
 /// A robot in a URDF or MJCF file: `[[robot]]` of a scene file, which reading it turns into bodies and sites.
 ///
-/// Links at fixed joints fold into what carries them and are sites of their names; other links are bodies of their names.
+/// Links at fixed joints fold into what carries them and are sites of their names; other links are bodies of their names, as are those with geometry that are fixed to a
+/// root which is but a place in the world.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Robot {
@@ -181,6 +182,9 @@ impl Robot {
             mass: link.mass,
             density: link.density,
             keep: link.keep,
+            center_of_mass: link.center_of_mass,
+            volume: link.volume,
+            center_of_buoyancy: link.center_of_buoyancy,
             of_body: link.of_body(),
         };
         Options {
@@ -192,8 +196,10 @@ impl Robot {
             followers: self.mimic,
             without_limits: self.limits == Some(false),
             start: self.start.clone(),
-            driven: self.motions.keys().cloned().collect(),
-            zeroed: self.zeros.keys().cloned().collect(),
+            driven: (self.motions.iter())
+                .map(|(joint, motion)| (joint.clone(), begins(motion)))
+                .collect(),
+            zeroed: self.zeros.clone(),
             links: (self.links.iter())
                 .map(|(name, of)| (name.clone(), link(of)))
                 .collect(),
@@ -225,6 +231,14 @@ impl Robot {
         report.weigh(fluid.density, STANDARD_GRAVITY);
         Ok(report)
     }
+}
+
+/// Where motions begin; what isn't finite is refused by whoever checks them.
+fn begins(motion: &[Motion]) -> Vec<f64> {
+    let values = motion.iter().map(|one| one.value(0.0));
+    values
+        .map(|q| if q.is_finite() { q } else { 0.0 })
+        .collect()
 }
 
 /// m/s².
@@ -322,6 +336,7 @@ impl Scene {
             STANDARD_GRAVITY
         };
         report.weigh(self.fluid.density, gravity);
+        self.imports.add(report.clone());
         Ok(Added {
             bodies: added,
             joints,

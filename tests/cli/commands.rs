@@ -791,3 +791,49 @@ fn a_result_that_is_lost_is_a_failure() {
     assert_eq!(done.status.code(), Some(1));
     assert!(text(&done.stderr).contains("standard output"));
 }
+
+/// Of a scene `inspect` tells what its robots come to, in that scene's water; a run warns of what of them is dry.
+#[cfg(feature = "urdf")]
+#[test]
+fn robots_of_scenes_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let inertial = r#"<inertial><mass value="1"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>"#;
+    let ball = |name: &str, radius: f64| {
+        format!(
+            r#"<link name="{name}">{inertial}<collision><geometry><sphere radius="{radius}"/></geometry></collision></link>"#
+        )
+    };
+    let joint = |name: &str, parent: &str, child: &str| {
+        format!(
+            r#"<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/></joint>"#
+        )
+    };
+    let whole = [
+        ball("a", 0.2),
+        format!(r#"<link name="b">{inertial}</link>"#),
+        ball("c", 0.03),
+        joint("j", "a", "b"),
+        joint("k", "b", "c"),
+    ];
+    let text = format!("<robot name=\"r\">{}</robot>", whole.concat());
+    let robot = file(&folder, "robot.urdf", &text);
+    let scene = "time_step = 0.01\nsteps = 1\n[fluid]\ndensity = 500.0\n";
+    let empty = file(&folder, "empty.toml", scene);
+    let two = "[[robot]]\nurdf = \"robot.urdf\"\n[[robot]]\nurdf = \"robot.urdf\"\nprefix = \"o/\"\nposition = [9.0, 0.0, 0.0]\n";
+    let two = file(&folder, "two.toml", &format!("{scene}{two}"));
+    let told = json(&["inspect", &two]);
+    assert_eq!(told["robots"].as_array().unwrap().len(), 2);
+    assert_eq!(told["robots"][1]["density"], 500.0);
+    let people = said(&["inspect", &two]);
+    assert_eq!(people.matches("robot \"r\"").count(), 2, "{people}");
+    fails(&["inspect", &empty], 1, &["empty.toml", "no robot"]);
+    fails(
+        &["inspect", &two, "--density", "1"],
+        1,
+        &["--density", "fluid"],
+    );
+    for input in [&two, &robot] {
+        let ran = said(&["run", input, "--steps", "1", "--fidelity", "isolated"]);
+        crate::support::says(&ran, &["warning: robot \"r\"", "body \"c\" is dry"]);
+    }
+}

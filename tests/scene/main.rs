@@ -9,6 +9,8 @@ mod mjcf;
 mod mjcf_text;
 #[cfg(feature = "urdf")]
 mod robots;
+#[cfg(feature = "urdf")]
+mod robots_told;
 mod tradeoff;
 mod validate;
 

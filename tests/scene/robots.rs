@@ -9,46 +9,46 @@ use nalgebra::{DVector, Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-const INERTIAL: &str = r#"<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial>"#;
+pub const INERTIAL: &str = r#"<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial>"#;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// A file in a folder of its own.
-fn file(text: &str) -> (TempDir, PathBuf) {
+pub fn file(text: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
     (folder, path)
 }
 
-fn robot(inner: &str) -> String {
+pub fn robot(inner: &str) -> String {
     format!("<robot name=\"r\">\n{inner}\n</robot>\n")
 }
 
-fn link(name: &str, inner: &str) -> String {
+pub fn link(name: &str, inner: &str) -> String {
     format!("<link name=\"{name}\">{INERTIAL}{inner}</link>\n")
 }
 
-fn joint(name: &str, kind: &str, parent: &str, child: &str, inner: &str) -> String {
+pub fn joint(name: &str, kind: &str, parent: &str, child: &str, inner: &str) -> String {
     format!(
         "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>{inner}</joint>\n"
     )
 }
 
-fn collision(geometry: &str, origin: &str) -> String {
+pub fn collision(geometry: &str, origin: &str) -> String {
     format!("<collision>{origin}<geometry>{geometry}</geometry></collision>")
 }
 
-fn read(text: &str, options: &Robot) -> hydrograd::Result<Scene> {
+pub fn read(text: &str, options: &Robot) -> hydrograd::Result<Scene> {
     let (_folder, path) = file(text);
     let scene = Scene::from_urdf(path, options)?;
     scene.validate().map(|()| scene)
 }
 
 /// Two links at a joint.
-fn pair(kind: &str, inner: &str) -> String {
+pub fn pair(kind: &str, inner: &str) -> String {
     robot(
         &[
             link("a", ""),
@@ -60,12 +60,12 @@ fn pair(kind: &str, inner: &str) -> String {
 }
 
 #[track_caller]
-fn refused(text: &str, words: &[&str]) {
+pub fn refused(text: &str, words: &[&str]) {
     refused_with(text, &Robot::default(), words);
 }
 
 #[track_caller]
-fn refused_with(text: &str, options: &Robot, words: &[&str]) {
+pub fn refused_with(text: &str, options: &Robot, words: &[&str]) {
     let error = read(text, options).unwrap_err().to_string();
     says(error, &[&["robot.urdf"], words].concat());
 }
@@ -738,7 +738,9 @@ fn inertias_that_can_not_be_are_refused() {
         }
         robot(&text)
     };
-    read(&chain(&["b"], &["a", "b", "c"]), &Robot::default()).unwrap();
+    let across = "<child link=\"c\"/><axis xyz=\"0 1 0\"/>";
+    let taken = chain(&["b"], &["a", "b", "c"]).replace("<child link=\"c\"/>", across);
+    read(&taken, &Robot::default()).unwrap();
     refused(
         &chain(&["c"], &["a", "b", "c"]),
         &["joint \"to_c\"", "\"c\" without mass"],

@@ -27,6 +27,8 @@ pub(super) struct File {
     pub shapes: HashMap<String, Shape>,
     /// What is to be told.
     pub notes: Vec<String>,
+    /// The element by which a joint follows another one.
+    pub coupled_by: &'static str,
 }
 
 impl File {
@@ -40,6 +42,7 @@ impl File {
             extras: HashMap::new(),
             shapes: HashMap::new(),
             notes: Vec::new(),
+            coupled_by: "<mimic>",
         }
     }
 }
@@ -72,6 +75,23 @@ pub(super) fn parse_error(path: &Path, message: impl Into<String>) -> Error {
         path: path.to_owned(),
         message: message.into(),
     }
+}
+
+/// The text of a file as XML.
+///
+/// # Errors
+/// What isn't XML, and document type definitions.
+pub(super) fn document<'t>(path: &Path, text: &'t str) -> Result<Document<'t>> {
+    Document::parse(text).map_err(|error| {
+        let message = match error {
+            roxmltree::Error::DtdDetected => {
+                "document type definitions (<!DOCTYPE …>) aren't read: take it away, and write out what its entities stand for"
+                    .into()
+            }
+            error => format!("{error}; this is not XML yet"),
+        };
+        parse_error(path, message)
+    })
 }
 
 /// What another's parser makes of a file, which may panic on what no exporter writes: here that is an error. `kind` is what the file isn't yet.

@@ -27,7 +27,7 @@ fn led(file: &File, number: usize) -> Result<Option<Led>> {
     }
     if !(ratio.is_finite() && offset.is_finite()) {
         return Err(Error::input(
-            format!("{}: mimic", joint_place(file, number)),
+            format!("{}: {}", joint_place(file, number), file.coupled_by),
             format!("multiplier {ratio}, offset {offset}"),
             "give finite numbers",
         ));
@@ -60,9 +60,12 @@ pub(super) fn follow(
         let own = all[b].as_ref().is_some_and(|m| m.joint.coordinates() == 1);
         let Some(leader) = leader.filter(|_| own) else {
             return Err(Error::input(
-                format!("{}: mimic", joint_place(file, number)),
+                format!("{}: {}", joint_place(file, number), file.coupled_by),
                 format!("joint {:?}", led.joint),
-                "both joints must have one coordinate (revolute, continuous or prismatic): take <mimic> away",
+                format!(
+                    "both joints must have one coordinate (revolute, continuous or prismatic): take {} away",
+                    file.coupled_by
+                ),
             ));
         };
         followers.push((b, leader, led.ratio, led.offset));

@@ -17,49 +17,53 @@ const GRIDS: [f64; 3] = [1e-7, 1e-5, 1e-3];
 
 /// The convex hull of points, with at most [`MOST_FACES`] faces.
 ///
+/// None of points without a volume.
+///
 /// # Errors
 /// As [`FileMesh::hull`].
-pub(super) fn hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
-    fewer(whole_hull(name, points)?, MOST_FACES)
+pub(super) fn hull(name: &str, points: &[Vec3]) -> Result<Option<TriMesh>> {
+    Ok(whole_hull(name, points)?.map(|whole| fewer(whole, MOST_FACES)))
 }
 
 /// The convex hull of points as the water sees it: as many faces as it has or, with its volume, as many as can be worked with.
 ///
+/// None of points without a volume.
+///
 /// # Errors
 /// As [`hull`].
-pub(super) fn fine_hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
-    let whole = whole_hull(name, points)?;
+pub(super) fn fine_hull(name: &str, points: &[Vec3]) -> Result<Option<TriMesh>> {
+    let Some(whole) = whole_hull(name, points)? else {
+        return Ok(None);
+    };
     let volume = whole.mass_properties().volume;
-    Ok(match whole.faces().len() <= FINE_FACES {
+    Ok(Some(match whole.faces().len() <= FINE_FACES {
         true => whole,
-        false => of_volume(&fewer(whole, FINE_FACES)?, volume),
-    })
+        false => of_volume(&fewer(whole, FINE_FACES), volume),
+    }))
 }
 
-/// A hull within or near another with at most so many faces.
-fn fewer(whole: TriMesh, most: usize) -> Result<TriMesh> {
+/// A hull within or near another with at most so many faces, where there is one.
+fn fewer(whole: TriMesh, most: usize) -> TriMesh {
     if whole.faces().len() <= most {
-        return Ok(whole);
+        return whole;
     }
     // Vertices that are left move a little off the hull: the hull of these has no more faces than they.
-    match whole.coarsened(most) {
-        Ok(fewer) => whole_hull(whole.name(), fewer.vertices()),
-        Err(_) => Ok(whole),
-    }
+    let fewer = whole.coarsened(most);
+    let hull = fewer.and_then(|fewer| whole_hull(whole.name(), fewer.vertices()));
+    hull.ok().flatten().unwrap_or(whole)
 }
 
-fn whole_hull(name: &str, points: &[Vec3]) -> Result<TriMesh> {
-    let mut last = None;
+fn whole_hull(name: &str, points: &[Vec3]) -> Result<Option<TriMesh>> {
+    let mut first = None;
     for grid in GRIDS {
-        match on_grid(name, points, grid).hull() {
-            Ok(hull) => return Ok(hull),
-            Err(error) => last = Some(error),
+        match on_grid(name, points, grid).solid_hull() {
+            Ok(Some(hull)) => return Ok(Some(hull)),
+            other => {
+                first.get_or_insert(other);
+            }
         }
     }
-    match last {
-        Some(error) => Err(error),
-        None => on_grid(name, points, 0.0).hull(),
-    }
+    first.unwrap_or(Ok(None))
 }
 
 /// The points as faces, those of one place once.
@@ -86,23 +90,22 @@ fn on_grid(name: &str, points: &[Vec3], grid: f64) -> FileMesh {
     }
 }
 
-/// The part of a convex mesh where `normal`·x ≤ `level`, with at most [`MOST_FACES`] faces; none if nothing with a volume is left.
+/// The part of a convex mesh where `normal`·x ≤ `level`, with at most [`MOST_FACES`] faces; none if nothing with a volume is left, or no hull of what is left is
+/// found.
 pub(super) fn half(mesh: &TriMesh, normal: &Vec3, level: f64) -> Option<TriMesh> {
     part(mesh, normal, level, hull)
 }
 
 /// The same, as the water sees it.
 pub(super) fn fine_half(mesh: &TriMesh, normal: &Vec3, level: f64) -> Option<TriMesh> {
-    part(mesh, normal, level, |name, points| {
-        fine_hull(name, points).or_else(|_| hull(name, points))
-    })
+    part(mesh, normal, level, fine_hull)
 }
 
 fn part(
     mesh: &TriMesh,
     normal: &Vec3,
     level: f64,
-    hull: impl Fn(&str, &[Vec3]) -> Result<TriMesh>,
+    hull: impl Fn(&str, &[Vec3]) -> Result<Option<TriMesh>>,
 ) -> Option<TriMesh> {
     let height = |v: usize| normal.dot(&mesh.vertices()[v]) - level;
     let all = mesh.vertices().iter();
@@ -121,7 +124,7 @@ fn part(
     if points.len() < 4 {
         return None;
     }
-    hull(mesh.name(), &points).ok()
+    hull(mesh.name(), &points).ok().flatten()
 }
 
 /// The direction from convex body `a` to `b` along which they lie least in each other, the level that `a` reaches along it, and how deep that is past `b`'s beginning: the

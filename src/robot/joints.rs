@@ -160,7 +160,7 @@ fn follows(
 ) -> Result<()> {
     let name = &file.robot.joints[number].name;
     let wrong = |value: String, remedy: &str| {
-        let place = format!("{}: mimic", joint_place(file, number));
+        let place = format!("{}: {}", joint_place(file, number), file.coupled_by);
         Err(Error::input(place, value, remedy))
     };
     // Of the leader, and of whom that follows, and so on.

@@ -88,21 +88,34 @@ impl Loaded {
     }
 
     /// Its convex hull with few faces; none if it has no volume.
-    pub fn hull(&self) -> Option<&TriMesh> {
-        self.hull.get_or_init(|| self.made(hull)).as_ref()
+    ///
+    /// # Errors
+    /// No hull is found, though there is a volume.
+    pub fn hull(&self) -> Result<Option<&TriMesh>> {
+        self.once(&self.hull, hull)
     }
 
     /// Its convex hull as the water sees it; none if it has no volume.
-    pub fn fine(&self) -> Option<&TriMesh> {
-        let fine = self.fine.get_or_init(|| self.made(fine_hull)).as_ref();
-        fine.or_else(|| self.hull())
+    ///
+    /// # Errors
+    /// As [`Self::hull`].
+    pub fn fine(&self) -> Result<Option<&TriMesh>> {
+        self.once(&self.fine, fine_hull)
     }
 
-    fn made(&self, hull: impl Fn(&str, &[Vec3]) -> Result<TriMesh>) -> Option<TriMesh> {
+    fn once<'c>(
+        &self,
+        cell: &'c OnceCell<Option<TriMesh>>,
+        hull: impl Fn(&str, &[Vec3]) -> Result<Option<TriMesh>>,
+    ) -> Result<Option<&'c TriMesh>> {
+        if let Some(known) = cell.get() {
+            return Ok(known.as_ref());
+        }
         let used = self.mesh.faces.iter().flatten();
         let points = used.filter_map(|v| self.mesh.vertices.get(*v));
         let points: Vec<Vec3> = points.copied().collect();
-        hull(&format!("convex hull of {}", self.path.display()), &points).ok()
+        let made = hull(&self.path.display().to_string(), &points)?;
+        Ok(cell.get_or_init(|| made).as_ref())
     }
 }
 
@@ -115,7 +128,7 @@ impl Piece {
     pub fn points(&self) -> Result<Vec<Vec3>> {
         let own = match &self.form {
             Form::Primitive(shape) => points(shape)?,
-            Form::Mesh(loaded) => match loaded.fine() {
+            Form::Mesh(loaded) => match loaded.fine()? {
                 Some(hull) => hull.vertices().to_vec(),
                 None => Vec::new(),
             },
@@ -127,7 +140,7 @@ impl Piece {
     pub fn hull(&self) -> Result<Option<TriMesh>> {
         let own = match &self.form {
             Form::Primitive(shape) => build(shape, Path::new(""), Some(FACES))?,
-            Form::Mesh(loaded) => match loaded.hull() {
+            Form::Mesh(loaded) => match loaded.hull()? {
                 Some(hull) => hull.clone(),
                 None => return Ok(None),
             },
@@ -272,6 +285,11 @@ impl<'f> Meshes<'f> {
             Err(Error::Mesh { problem, .. }) => Ok(Err(problem)),
             Err(error) => Ok(Err(error.to_string())),
         }
+    }
+
+    /// As [`Piece::hull`], with an error that names the link.
+    pub fn hull(&self, piece: &Piece) -> Result<Option<TriMesh>> {
+        (piece.hull()).map_err(|e| e.of(&link_place(self.file, piece.link)))
     }
 
     /// Tells what became of a piece that is a mesh.

@@ -3,7 +3,7 @@
 //! `urdf-rs` gives the typed form. It passes over what it doesn't know and says neither where an error is nor what was left out, so the text
 //! is first looked through as XML: what can't be is refused there with line and name, what isn't used is listed, and what is used alone is handed on ([`kept`](mod@super::kept)).
 
-use super::file::{File, JointText, LARGEST, check_depth, guarded, parse_error};
+use super::file::{File, JointText, LARGEST, check_depth, document, guarded, parse_error};
 use super::kept::kept;
 use super::mjcf;
 use super::report::Unused;
@@ -37,8 +37,7 @@ pub(super) fn read(path: &Path) -> Result<File> {
 }
 
 fn parse(path: &Path, text: &str) -> Result<File> {
-    let document = Document::parse(text)
-        .map_err(|e| parse_error(path, format!("{e}; this is not XML yet")))?;
+    let document = document(path, text)?;
     check_depth(path, &document)?;
     if document.root_element().tag_name().name() == "mujoco" {
         return mjcf::parse(path, &document);

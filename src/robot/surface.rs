@@ -144,7 +144,12 @@ impl Immersed {
                 match fewer {
                     Ok(mesh) => {
                         meshes.tell(piece, "closed: used itself", report);
-                        let hull = piece.hull()?;
+                        let hull = meshes.hull(piece).unwrap_or_else(|error| {
+                            report.note(format!(
+                                "body {name:?}: its mesh itself is for contact, since it has no convex hull: {error}"
+                            ));
+                            None
+                        });
                         let own = mesh.mass_properties().volume;
                         let convex = hull
                             .as_ref()
@@ -194,7 +199,7 @@ impl Immersed {
             {
                 meshes.surface(piece.link, loaded, options)?.ok();
             }
-            let hull = piece.hull()?;
+            let hull = meshes.hull(piece)?;
             let used_as = match (&hull, pieces.len()) {
                 (None, _) => "left out: it has no volume",
                 (_, 1) => "its convex hull",
@@ -205,14 +210,20 @@ impl Immersed {
         }
         let whole = match &hulls[..] {
             [] => None,
-            [(piece, hull)] => Some(fine(name, &[piece]).unwrap_or_else(|| hull.clone())),
+            [(piece, hull)] => {
+                let fine = fine(name, &[piece]).ok().flatten();
+                Some(fine.unwrap_or_else(|| hull.clone()))
+            }
             _ => {
                 let pieces: Vec<&Piece> = hulls.iter().map(|(piece, _)| *piece).collect();
-                fine(name, &pieces).or_else(|| {
-                    let points = hulls.iter().flat_map(|(_, hull)| hull.vertices());
-                    let points: Vec<Vec3> = points.copied().collect();
-                    hull(&hull_name(name), &points).ok()
-                })
+                match fine(name, &pieces) {
+                    Ok(Some(fine)) => Some(fine),
+                    _ => {
+                        let points = hulls.iter().flat_map(|(_, hull)| hull.vertices());
+                        let points: Vec<Vec3> = points.copied().collect();
+                        hull(&body(name), &points)?
+                    }
+                }
             }
         };
         let Some(whole) = whole else {
@@ -278,13 +289,13 @@ fn coarser(mesh: &TriMesh, most: usize) -> Result<TriMesh> {
     found.map_or(first, Ok)
 }
 
-fn hull_name(body: &str) -> String {
-    format!("convex hull of body {body:?}")
+fn body(name: &str) -> String {
+    format!("body {name:?}")
 }
 
-/// The convex hull of pieces as the water sees it; none where none is found.
-fn fine(body: &str, pieces: &[&Piece]) -> Option<TriMesh> {
+/// The convex hull of pieces as the water sees it; none if it has no volume.
+fn fine(name: &str, pieces: &[&Piece]) -> Result<Option<TriMesh>> {
     let each = pieces.iter().map(|piece| piece.points());
-    let points: Vec<Vec<Vec3>> = each.collect::<Result<_>>().ok()?;
-    fine_hull(&hull_name(body), &points.concat()).ok()
+    let points: Vec<Vec<Vec3>> = each.collect::<Result<_>>()?;
+    fine_hull(&body(name), &points.concat())
 }

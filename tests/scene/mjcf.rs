@@ -1,10 +1,12 @@
 //! Robots in MJCF files: what they become, and what is refused.
 
+use crate::support::bodies::turned_cube;
 use crate::support::says;
 use hydrograd::Fluid;
 use hydrograd::scene::{Base, Joint, Robot, Scene, Shape};
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::{DVector, Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::fmt::Write;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -154,6 +156,95 @@ fn geometry_gives_shapes_and_masses() {
         .unwrap();
     assert_eq!(added.joints.len(), 1);
     assert!(scene.validate().is_ok());
+}
+
+/// A mesh whose hull has points in line is in the water, and has its mass; one without a volume is told.
+#[test]
+fn no_mesh_is_dry_or_massless_without_a_word() {
+    let text = r#"<mujoco><asset><mesh name="m" file="open.obj"/><mesh name="flat" file="flat.obj"/></asset>
+        <worldbody><body name="a"><freejoint/><geom type="mesh" mesh="m"/></body>
+        <body name="b" pos="9 0 0"><freejoint/><geom size="0.1"/><geom type="mesh" mesh="flat"/></body>
+        </worldbody></mujoco>"#;
+    let (folder, path) = folder(|_| text.into());
+    let mut open = String::new();
+    let points = turned_cube(2, 0.1);
+    for x in &points {
+        writeln!(open, "v {} {} {}", x.x, x.y, x.z).unwrap();
+    }
+    for v in 1..=points.len() - 2 {
+        writeln!(open, "f {v} {} {}", v + 1, v + 2).unwrap();
+    }
+    std::fs::write(folder.path().join("open.obj"), open).unwrap();
+    let flat = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+    std::fs::write(folder.path().join("flat.obj"), flat).unwrap();
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let added = scene.add_robot(&path, &Robot::default()).unwrap();
+    let a = &added.report.bodies[added
+        .report
+        .bodies
+        .iter()
+        .position(|b| b.body == "a")
+        .unwrap()];
+    assert!((a.mass - 1000.0).abs() < 1e-3, "{}", a.mass);
+    assert!((a.volume - 1.0).abs() < 1e-2, "{}", a.volume);
+    says(
+        added.report.to_string(),
+        &[
+            "body \"b\": geom \"flat\" has no volume, and so no mass",
+            "open.obj are of its convex hull",
+        ],
+    );
+}
+
+/// MuJoCo counts what isn't convex more than once; here it is the volume, and said.
+#[test]
+fn masses_of_notched_meshes_are_of_their_volume() {
+    let text = r#"<mujoco><asset><mesh name="m" file="notched.obj"/></asset><worldbody>
+        <body name="a"><freejoint/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"#;
+    let (folder, path) = folder(|_| text.into());
+    // A U of seven unit cubes.
+    let corners = [
+        [0, 0],
+        [3, 0],
+        [3, 3],
+        [2, 3],
+        [2, 1],
+        [1, 1],
+        [1, 3],
+        [0, 3],
+    ];
+    let mut notched = String::new();
+    for z in [0, 1] {
+        for [x, y] in corners {
+            writeln!(notched, "v {x} {y} {z}").unwrap();
+        }
+    }
+    for [a, b, c] in [
+        [1, 2, 5],
+        [1, 5, 6],
+        [2, 3, 4],
+        [2, 4, 5],
+        [1, 6, 7],
+        [1, 7, 8],
+    ] {
+        writeln!(notched, "f {a} {c} {b}\nf {} {} {}", a + 8, b + 8, c + 8).unwrap();
+    }
+    for k in 0..8 {
+        let next = (k + 1) % 8;
+        writeln!(notched, "f {} {} {} {}", k + 1, next + 1, next + 9, k + 9).unwrap();
+    }
+    std::fs::write(folder.path().join("notched.obj"), notched).unwrap();
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let added = scene.add_robot(&path, &Robot::default()).unwrap();
+    assert!((added.report.mass - 7000.0).abs() < 1e-9);
+    says(
+        added.report.to_string(),
+        &[
+            "notched.obj",
+            "7.0000e0 m³",
+            "MuJoCo's default (inertia=\"legacy\")",
+        ],
+    );
 }
 
 /// Frames move pieces between two points, sites may have names of bodies, joints start at their references, and equalities that aren't active couple nothing.

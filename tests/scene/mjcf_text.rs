@@ -256,6 +256,185 @@ fn places_come_from_classes() {
     );
 }
 
+/// The z axis turned to its opposite is turned about x, wherever an element says so.
+#[test]
+fn opposite_z_axes_turn_about_x() {
+    let places = |turn: &str| {
+        let text = format!(
+            r#"<worldbody><body name="a"><freejoint/><geom size="0.1"/><geom type="box" size="0.1 0.2 0.3" pos="0.5 1 0" {turn}/>
+            <site name="s" pos="1 2 3" {turn}/><frame {turn}><geom size="0.1" pos="0.3 0.4 0.5"/><site name="t" pos="0.1 0.2 0.3"/></frame>
+            <body name="b" pos="3 0 0" {turn}><joint axis="0 1 0"/><inertial pos="0.1 0.2 0.3" mass="1" diaginertia="0.02 0.03 0.04" {turn}/>
+            <site name="u" pos="0.1 0.2 0.3"/><geom size="0.1" pos="0.1 0.2 0.3"/></body></body></worldbody>"#
+        );
+        one(&text).unwrap().0
+    };
+    for (zaxis, quat) in [
+        ("0 0 -1", "0 1 0 0"),
+        ("0 0 -1e-200", "0 1 0 0"),
+        ("0 0 2", "1 0 0 0"),
+        ("0 3 0", "1 -1 0 0"),
+    ] {
+        let [found, right] = [
+            places(&format!("zaxis=\"{zaxis}\"")),
+            places(&format!("quat=\"{quat}\"")),
+        ];
+        let numbers = |scene: &Scene| -> Vec<f64> {
+            let placed = scene.sites.iter().map(|s| s.placement);
+            let placed = placed.chain(scene.bodies.iter().map(|b| b.placement));
+            // Where a point is that is on no axis.
+            let points = placed.flat_map(|p| {
+                let turn = UnitQuaternion::from_scaled_axis(Vector3::from(p.rotation));
+                let x: [f64; 3] = (turn * Vector3::new(1.0, 2.0, 3.0)).into();
+                x.into_iter().chain(p.position)
+            });
+            let masses = scene.bodies.iter().flat_map(|b| {
+                let inertia = b.inertia.clone().unwrap();
+                b.center_of_mass.unwrap().into_iter().chain(inertia)
+            });
+            points.chain(masses).collect()
+        };
+        let (found, right) = (numbers(&found), numbers(&right));
+        assert_eq!(found.len(), right.len());
+        for (x, y) in found.iter().zip(&right) {
+            assert!((x - y).abs() < 1e-6, "{zaxis}: {x} {y}");
+        }
+    }
+}
+
+/// Fewer numbers than a class has leave its others what they are; what would have no length is refused.
+#[test]
+fn sizes_keep_what_their_class_gives() {
+    let (scene, _) = one(r#"<default><geom type="capsule" size="0.05 0.2"/>
+          <default class="x"><geom type="box" size="0.1 0.2 0.3"/><default class="y"><geom size="0.4"/></default></default></default>
+        <worldbody><body name="a"><freejoint/><geom size="0.06"/></body>
+        <body name="b" pos="5 0 0"><freejoint/><geom class="y"/></body>
+        <body name="c" pos="9 0 0"><freejoint/><geom class="y" size="0.5 0.6"/></body></worldbody>"#)
+    .unwrap();
+    assert_eq!(body(&scene, "a").shape, Some(Shape::capsule(0.06, 0.4)));
+    assert_eq!(
+        body(&scene, "b").shape,
+        Some(Shape::cuboid([0.8, 0.4, 0.6]))
+    );
+    assert_eq!(
+        body(&scene, "c").shape,
+        Some(Shape::cuboid([1.0, 1.2, 0.6]))
+    );
+    for kind in ["capsule", "cylinder"] {
+        for size in ["size=\"0.06\"", "size=\"0.06\" fromto=\"1 1 1 1 1 1\""] {
+            refused(
+                &format!(
+                    "<worldbody><body name=\"a\"><geom type=\"{kind}\" {size}/></body></worldbody>"
+                ),
+                &["body \"a\"", kind, "no length", "half its length"],
+            );
+        }
+    }
+}
+
+/// Two bodies with a joint each, and what couples them.
+fn pair(first: &str, second: &str, coupling: &str) -> String {
+    format!(
+        "<compiler angle=\"radian\"/><worldbody><body name=\"a\"><joint name=\"j\" {first}/><geom size=\"0.1\"/></body>\n\
+         <body name=\"b\" pos=\"2 0 0\"><joint name=\"k\" {second}/><geom size=\"0.1\"/></body></worldbody>\n\
+         <equality>\n{coupling}</equality>"
+    )
+}
+
+/// Limits need a range that rises; without being asked for, others are told.
+#[test]
+fn ranges_rise() {
+    let (scene, report) = one(&pair("range=\"1 -1\"", "range=\"-1 1\"", "")).unwrap();
+    assert_eq!(body(&scene, "a").limits, None);
+    assert_eq!(body(&scene, "b").limits, Some([-1.0, 1.0]));
+    says(
+        report.to_string(),
+        &["joint \"j\"", "no limits", "from 1 to -1"],
+    );
+    let (_, report) = one(&pair("range=\"0 0\"", "limited=\"false\"", "")).unwrap();
+    assert!(!report.to_string().contains("no limits"));
+    for (joint, told) in [
+        ("limited=\"true\"", "no range"),
+        ("limited=\"true\" range=\"1 -1\"", "from 1 to -1"),
+        ("limited=\"true\" range=\"1 1\"", "from 1 to 1"),
+    ] {
+        refused(
+            &pair("", joint, ""),
+            &["joint \"k\"", "range", told, "larger"],
+        );
+    }
+}
+
+/// Joints that aren't there, or have no single coordinate, are refused where they are named; what couples nothing is told by its joint.
+#[test]
+fn equalities_name_joints() {
+    let coupled = |coupling: &str| pair("", "", coupling);
+    refused(
+        &coupled("<joint joint1=\"j\" joint2=\"kk\"/>"),
+        &[
+            "line 5",
+            "<joint> of the equalities",
+            "joint2 = \"kk\"",
+            "no such joint",
+        ],
+    );
+    refused(
+        &coupled("<joint joint1=\"jj\"/>"),
+        &["line 5", "joint1 = \"jj\"", "no such joint"],
+    );
+    refused(
+        &pair("type=\"ball\"", "", "<joint joint1=\"k\" joint2=\"j\"/>"),
+        &["line 5", "joint2 = \"j\"", "ball joint", "<equality>"],
+    );
+    let circle = "<joint joint1=\"j\" joint2=\"k\"/><joint joint1=\"k\" joint2=\"j\"/>";
+    refused(&coupled(circle), &["<equality>", "follows this one"]);
+    for (coupling, why) in [
+        ("<joint joint1=\"j\"/>", "holds it in one place"),
+        (
+            "<joint joint1=\"j\" joint2=\"k\" polycoef=\"0 1 2\"/>",
+            "straight line",
+        ),
+        (
+            "<joint joint1=\"j\" joint2=\"k\" active=\"false\"/>",
+            "isn't active",
+        ),
+    ] {
+        let (scene, report) = one(&coupled(coupling)).unwrap();
+        assert_eq!(body(&scene, "a").mimic, None);
+        says(report.to_string(), &["<equality> of joint \"j\"", why]);
+    }
+    let shifted = "<joint joint1=\"j\" joint2=\"k\" polycoef=\"0.5\"/>";
+    let (scene, _) = one(&coupled(shifted)).unwrap();
+    let mimic = body(&scene, "a").mimic.clone().unwrap();
+    assert_eq!((mimic.ratio, mimic.offset), (1.0, 0.5));
+}
+
+/// Of damping and springs the linear coefficient is read, and no other may count.
+#[test]
+fn damping_and_springs_are_linear() {
+    let (scene, _) = one(&pair("damping=\"0.2 0\"", "stiffness=\"3 0 0\"", "")).unwrap();
+    assert_eq!(body(&scene, "a").passive.unwrap().damping, 0.2);
+    assert_eq!(body(&scene, "b").passive.unwrap().stiffness, 3.0);
+    let curved = |joint: &str, words: &[&str]| refused(&pair(joint, "", ""), words);
+    curved(
+        "damping=\"0.2 0.1\"",
+        &["<joint> of body \"a\"", "0.2 0.1", "only the linear"],
+    );
+    curved(
+        "stiffness=\"1 0 2\"",
+        &["stiffness", "1 0 2", "only the linear"],
+    );
+    curved("damping=\"1 0 0 0\"", &["damping", "one finite number"]);
+}
+
+/// A file with a document type is told what isn't read of it, not that it is no XML.
+#[test]
+fn document_types_are_not_read() {
+    let text = "<!DOCTYPE mujoco [<!ENTITY r \"0.1\">]><mujoco/>";
+    let error = read(&[("r.xml", text)]).unwrap_err();
+    says(&error, &["r.xml", "<!DOCTYPE", "aren't read"]);
+    assert!(!error.to_string().contains("XML yet"));
+}
+
 /// Values that are read are checked where they stand, in classes too; what isn't read is told, and whatever it is harms nothing.
 #[test]
 fn attributes_are_checked_and_told() {

@@ -7,6 +7,7 @@ mod exact;
 #[cfg(feature = "meshio")]
 mod files;
 mod gaps;
+mod hulls;
 mod primitives;
 mod prisms;
 mod refine;

@@ -6,7 +6,7 @@ use hydrograd::boundary::BodyBoundary;
 use hydrograd::coupling::full::{Full, Preconditioner, SolveSettings};
 use hydrograd::coupling::{Coupling, Exclusions};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Rotation3};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -114,4 +114,16 @@ pub fn coin_iterations(
         .unwrap()
         .report()
         .iterations
+}
+
+/// Corners of a cube of side 1 m, and points that cut its edges into so many parts; turned by this angle about two axes, and in single precision, as in an STL file.
+pub fn turned_cube(parts: u32, angle: f64) -> Vec<Vec3> {
+    let turn = Rotation3::from_euler_angles(angle, 0.0, angle);
+    let grid = (0..(parts + 1).pow(3)).map(|k| {
+        let row = parts + 1;
+        [k % row, k / row % row, k / row / row]
+    });
+    let on_edges = grid.filter(|at| at.iter().filter(|k| **k % parts == 0).count() >= 2);
+    let points = on_edges.map(|at| turn * Vec3::from(at.map(f64::from)) / f64::from(parts));
+    points.map(|x| x.map(|x| f64::from(x as f32))).collect()
 }

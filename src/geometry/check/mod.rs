@@ -8,6 +8,7 @@ mod scan;
 
 pub use scan::check_parts;
 pub(super) use scan::check_rounded;
+pub(crate) use scan::has_area;
 
 use crate::error::{Error, Result};
 use serde::Serialize;

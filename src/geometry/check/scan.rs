@@ -78,6 +78,21 @@ fn corners(vertices: &[Vec3], face: [usize; 3]) -> [Vec3; 3] {
     face.map(|v| vertices[v])
 }
 
+/// Lengths of a face's sides: the first is that between the first two corners.
+fn sides([a, b, c]: &[Vec3; 3]) -> [f64; 3] {
+    [(b - a).norm(), (c - b).norm(), (a - c).norm()]
+}
+
+/// Whether a face of a mesh of this diameter has an area, to rounding.
+pub(crate) fn has_area(corners: &[Vec3; 3], diameter: f64) -> bool {
+    let longest = sides(corners).into_iter().fold(0.0, f64::max);
+    let area = area_vector(corners).norm();
+    // Written so that NaN from under- or overflow counts as flat.
+    2.0 * area > FLAT_FACE * longest * longest
+        && longest > POINT_FACE * diameter
+        && area.is_finite()
+}
+
 /// How many, the first face, and where.
 type Found = (usize, Option<usize>, Option<Vec3>);
 
@@ -229,18 +244,13 @@ impl<'a> Checker<'a> {
         let mut long = 0;
         let mut worst = (0.0, 0);
         for &f in &self.finite {
-            let [a, b, c] = corners(self.vertices, self.faces[f]);
-            let sides = [(b - a).norm(), (c - b).norm(), (a - c).norm()];
-            let longest = sides.into_iter().fold(0.0, f64::max);
-            let area = area_vector(&[a, b, c]).norm();
-            // Written so that NaN from under- or overflow counts as flat.
-            let solid = 2.0 * area > FLAT_FACE * longest * longest
-                && longest > POINT_FACE * diameter
-                && area.is_finite();
-            if !solid {
+            let corners = corners(self.vertices, self.faces[f]);
+            if !has_area(&corners, diameter) {
                 flat.push(f);
                 continue;
             }
+            let (sides, area) = (sides(&corners), area_vector(&corners).norm());
+            let longest = sides.into_iter().fold(0.0, f64::max);
             let aspect = longest * sides.iter().sum::<f64>() / (4.0 * 3f64.sqrt() * area);
             long += usize::from(aspect > LONG_FACE);
             if aspect > worst.0 {

@@ -17,6 +17,8 @@ pub(super) enum Kind {
     Whole,
     /// Three axes.
     Axes,
+    /// A number, and up to two coefficients of higher order that are zero.
+    Linear,
 }
 
 const FLAG: Kind = Kind::One(&["true", "false"]);
@@ -62,9 +64,8 @@ pub(super) fn read(element: &str, name: &str) -> Option<Kind> {
         ("joint", "limited") => THREE_WAYS,
         ("joint", "pos" | "axis") => VECTOR,
         ("joint", "range" | "springdamper") => Kind::Numbers(2, 2),
-        ("joint", "stiffness" | "damping" | "springref" | "armature" | "frictionloss" | "ref") => {
-            NUMBER
-        }
+        ("joint", "stiffness" | "damping") => Kind::Linear,
+        ("joint", "springref" | "armature" | "frictionloss" | "ref") => NUMBER,
         ("geom", "name" | "class" | "mesh") => Kind::Text,
         ("geom", "type") => Kind::One(GEOMS),
         ("geom", "size") => Kind::Numbers(1, 3),
@@ -212,6 +213,16 @@ fn lacks(kind: Kind, name: &str, value: &str) -> Option<String> {
             let right = value.len() == 3 && value.chars().all(|c| "xyzXYZ".contains(c));
             (!right).then(|| "three of x, y, z, X, Y and Z, such as \"xyz\"".into())
         }
+        Kind::Linear => match numbers(value).as_deref() {
+            Some([_, higher @ ..]) if higher.len() <= 2 => {
+                let curved = higher.iter().any(|x| *x != 0.0);
+                curved.then(|| {
+                    "one number, or zero after the first, as only the linear coefficient is read"
+                        .into()
+                })
+            }
+            _ => Some("one finite number".into()),
+        },
         Kind::Numbers(fewest, most) => {
             let found = numbers(value);
             let right = (found.as_ref()).is_some_and(|all| (fewest..=most).contains(&all.len()));

@@ -5,6 +5,8 @@ use crate::Result;
 
 /// The elements that have defaults.
 pub(super) const KINDS: [&str; 5] = ["geom", "joint", "site", "mesh", "equality"];
+/// What may have fewer numbers than there are: the others stay those of the class.
+const PADDED: &str = "size";
 /// The class that the others hang on.
 const ROOT: &str = "main";
 
@@ -85,7 +87,7 @@ impl<'e> Classes<'e> {
     }
 
     /// An element of this kind with all that it has by its class, or else by `around`, that of the bodies and frames around it: what is its own stands for what its
-    /// class gives, and that for what the class has of those that it hangs on.
+    /// class gives, and that for what the class has of those that it hangs on. Of sizes each number stands for itself.
     ///
     /// # Errors
     /// A class that isn't there.
@@ -106,9 +108,21 @@ impl<'e> Classes<'e> {
         let given = given.flat_map(|e| e.attributes.iter().filter(|(name, _)| name != "name"));
         for (name, value) in given.chain(&element.attributes) {
             if name != "class" {
-                made.set(name, value);
+                let below = made.get(name).filter(|_| name == PADDED);
+                let value = padded(value, below.unwrap_or_default());
+                made.set(name, &value);
             }
         }
         Ok(made)
+    }
+}
+
+/// Numbers, and those past them that stand below.
+fn padded(value: &str, below: &str) -> String {
+    let own = value.split_ascii_whitespace();
+    let rest = below.split_ascii_whitespace().skip(own.clone().count());
+    match below.is_empty() {
+        true => value.into(),
+        false => own.chain(rest).collect::<Vec<_>>().join(" "),
     }
 }

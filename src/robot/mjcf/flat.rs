@@ -3,8 +3,9 @@
 use super::attributes::{numbers, read};
 use super::classes::Classes;
 use super::element::{Element, TURNS};
-use super::geometry::between;
+use super::geometry::{between, z_along};
 use crate::Result;
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// Sections, in the order in which they are to be read.
 const SECTIONS: [&str; 4] = ["compiler", "asset", "worldbody", "equality"];
@@ -47,8 +48,42 @@ pub(super) fn flat(file: &Element) -> Result<Element> {
             }
         }
     }
+    coupled(&equality, &world)?;
     made.children = vec![compiler, asset, world, equality];
     Ok(made)
+}
+
+/// Refuses equalities of joints that aren't there, or have more than one coordinate.
+fn coupled(equality: &Element, world: &Element) -> Result<()> {
+    let mut joints = Vec::new();
+    let mut open = vec![world];
+    while let Some(element) = open.pop() {
+        let own = element.children.iter();
+        joints.extend(own.clone().filter(|e| e.tag.ends_with("joint")));
+        open.extend(own);
+    }
+    for coupling in equality.all("joint") {
+        for end in ["joint1", "joint2"] {
+            let Some(name) = coupling.get(end).filter(|name| !name.is_empty()) else {
+                continue;
+            };
+            let Some(joint) = joints.iter().find(|j| j.get("name") == Some(name)) else {
+                let what = format!("{end} = {name:?}: there is no such joint");
+                return Err(coupling.wrong_of("the equalities", what));
+            };
+            let kind = match &joint.tag[..] {
+                "freejoint" => "free",
+                _ => joint.get("type").unwrap_or("hinge"),
+            };
+            if !["hinge", "slide"].contains(&kind) {
+                let what = format!(
+                    "{end} = {name:?} is a {kind} joint: only hinges and slides have the one coordinate that an <equality> couples"
+                );
+                return Err(coupling.wrong_of("the equalities", what));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// An element without its children, and without attributes that aren't read.
@@ -57,7 +92,23 @@ fn own(element: &Element, kind: &str) -> Element {
     let kept = (element.attributes.iter())
         .filter(|(name, _)| read(kind, name).is_some() && !name.ends_with("class"));
     made.attributes = kept.cloned().collect();
+    if let Some(&[x, y, z]) = made.get("zaxis").and_then(numbers).as_deref() {
+        turn(&mut made, &z_along(Vector3::new(x, y, z)));
+    }
+    // The coefficients of higher order are zero.
+    for name in ["stiffness", "damping"] {
+        let linear = made.get(name).and_then(|all| all.split_whitespace().next());
+        if let Some(linear) = linear.map(String::from) {
+            made.set(name, &linear);
+        }
+    }
     made
+}
+
+fn turn(element: &mut Element, turn: &UnitQuaternion<f64>) {
+    let turn = turn.quaternion();
+    let value = format!("{} {} {} {}", turn.w, turn.i, turn.j, turn.k);
+    element.set("quat", &value);
 }
 
 /// What is in a body, or a frame of one; `around` is the class of what is around it.
@@ -129,12 +180,8 @@ fn site(mut made: Element) -> Element {
         unplace(&mut made);
         let at = between([a, b, c], [d, e, f]);
         let [x, y, z]: [f64; 3] = at.translation.vector.into();
-        let turn = at.rotation.quaternion();
         made.set("pos", &format!("{x} {y} {z}"));
-        made.set(
-            "quat",
-            &format!("{} {} {} {}", turn.w, turn.i, turn.j, turn.k),
-        );
+        turn(&mut made, &at.rotation);
     }
     (made.attributes).retain(|(name, _)| name != "fromto");
     made

@@ -4,12 +4,15 @@ use super::super::inertia::Inertial;
 use super::super::pieces::Loaded;
 use crate::geometry::MassProperties;
 use crate::shape::Shape;
+use crate::shape::file::FileMesh;
 use crate::{Error, Result};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Geom, GeomType};
-use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
-use std::f64::consts::PI;
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
+
+/// Of a mesh's volume, by how much another program's may differ without a word.
+const SAME: f64 = 1e-3;
 
 /// A pose of theirs.
 pub(super) fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
@@ -54,7 +57,18 @@ impl<'m> Geometries<'m> {
         let (at, [x, y, z]) = placed(geom, pose);
         let shape = match geom.type_ {
             GeomType::Sphere => Shape::sphere(x),
-            GeomType::Capsule if y == 0.0 => Shape::sphere(x),
+            kind @ (GeomType::Capsule | GeomType::Cylinder) if y == 0.0 => {
+                let field = match kind {
+                    GeomType::Capsule => "size of a capsule",
+                    _ => "size of a cylinder",
+                };
+                let given = format!("radius {x} and no length");
+                return Err(self.wrong(
+                    field,
+                    given,
+                    "give its radius and half its length (size=\"0.05 0.2\"), or two points that aren't one (fromto)",
+                ));
+            }
             GeomType::Capsule => Shape::capsule(x, 2.0 * y),
             GeomType::Cylinder => Shape::cylinder(x, 2.0 * y),
             GeomType::Box => Shape::cuboid([x, y, z].map(|s| 2.0 * s)),
@@ -87,27 +101,31 @@ impl<'m> Geometries<'m> {
         Ok((std::path::absolute(&file).unwrap_or(file), asset.scale))
     }
 
-    /// Mass and inertia of a geom, whose own mass or density it is, or else `density`, kg/m³; none of what has no volume.
+    /// Mass and inertia of a geom, whose own mass or density it is, or else `density`, kg/m³; none of what has no volume, which `notes` say.
     pub fn inertial(
         &self,
         geom: &Geom,
         (solid, at): &Placed,
         density: f64,
+        notes: &mut Vec<String>,
     ) -> Result<Option<Inertial>> {
         let found = match solid {
             Solid::Shape(shape) => {
                 MassProperties::by_formula(shape).map_err(|e| e.of(&self.place()))?
             }
-            Solid::Mesh(file, scale) => {
-                let loaded = Loaded::new(file.clone(), *scale, &self.place())?;
-                let closed = loaded.mesh.clone().into_mesh().ok();
-                let whole = closed.or_else(|| loaded.fine().cloned());
-                whole.map(|mesh| mesh.mass_properties())
-            }
+            Solid::Mesh(file, scale) => self.of_mesh(file, *scale, notes)?,
         };
         let Some(found) = found else {
             return match geom.mass.filter(|m| *m != 0.0) {
-                None => Ok(None),
+                None => {
+                    let which = geom.name.as_deref().or(geom.mesh.as_deref());
+                    notes.push(format!(
+                        "{}: geom {:?} has no volume, and so no mass",
+                        self.of,
+                        which.unwrap_or_default()
+                    ));
+                    Ok(None)
+                }
                 Some(mass) => Err(self.wrong(
                     "mass of a geom",
                     mass,
@@ -130,6 +148,57 @@ impl<'m> Geometries<'m> {
         };
         Ok(Some(own.moved(at)))
     }
+
+    /// Of a mesh itself or, where it isn't closed, of its convex hull, at a density of one; none if that has no volume.
+    fn of_mesh(
+        &self,
+        file: &Path,
+        scale: [f64; 3],
+        notes: &mut Vec<String>,
+    ) -> Result<Option<MassProperties>> {
+        let loaded = Loaded::new(file.to_owned(), scale, &self.place())?;
+        let closed = loaded.mesh.clone().into_mesh().ok();
+        let (whole, whose) = match closed {
+            Some(mesh) => (Some(mesh), "the volume that it encloses"),
+            None => {
+                let hull = loaded.fine().map_err(|e| e.of(&self.place()))?;
+                (hull.cloned(), "its convex hull, as it isn't closed")
+            }
+        };
+        let found = whole.map(|mesh| mesh.mass_properties());
+        if let Some(found) = &found {
+            let other = legacy_volume(&loaded.mesh);
+            if (other - found.volume).abs() > SAME * found.volume {
+                notes.push(format!(
+                    "{}: mass and inertia of mesh {} are of {whose}, {:.4e} m³; MuJoCo's default (inertia=\"legacy\") takes about {other:.2e} m³ of it",
+                    self.of,
+                    file.display(),
+                    found.volume
+                ));
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// What MuJoCo's default makes of a mesh, m³: the tetrahedra between its faces and its surface's middle, all counted as positive.
+fn legacy_volume(mesh: &FileMesh) -> f64 {
+    let corners = |face: &[usize; 3]| {
+        let [a, b, c] = face.map(|v| mesh.vertices.get(v).copied());
+        Some([a?, b?, c?])
+    };
+    let faces: Vec<[Vector3<f64>; 3]> = mesh.faces.iter().filter_map(corners).collect();
+    let doubled = |[a, b, c]: &[Vector3<f64>; 3]| (b - a).cross(&(c - a));
+    let (mut first, mut area) = (Vector3::zeros(), 0.0);
+    for face in &faces {
+        let of_face = doubled(face).norm();
+        first += (face[0] + face[1] + face[2]) * (of_face / 3.0);
+        area += of_face;
+    }
+    let middle = first / area;
+    let each = faces.iter();
+    each.map(|face| doubled(face).dot(&(face[0] - middle)).abs() / 6.0)
+        .sum()
 }
 
 /// Where a piece is and its sizes: between two points where the file gives those.
@@ -151,8 +220,14 @@ fn placed(geom: &Geom, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
 /// The frame in the middle of two points whose z axis points from the second one to the first.
 pub(super) fn between(a: [f64; 3], b: [f64; 3]) -> Isometry3<f64> {
     let [a, b] = [a, b].map(Vector3::from);
-    let turn = Rotation3::rotation_between(&Vector3::z(), &(a - b))
-        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), PI));
-    let turn = UnitQuaternion::from_rotation_matrix(&turn);
-    Isometry3::from_parts(Translation3::from(0.5 * (a + b)), turn)
+    Isometry3::from_parts(Translation3::from(0.5 * (a + b)), z_along(a - b))
+}
+
+/// The shortest turn that takes the z axis to a direction; to its opposite it is about x.
+pub(super) fn z_along(direction: Vector3<f64>) -> UnitQuaternion<f64> {
+    // Of any length: squares of what is very small are zero.
+    let [x, y, z] = (direction / direction.amax().max(f64::MIN_POSITIVE)).into();
+    let across = x.hypot(y);
+    let axis = Unit::try_new(Vector3::new(-y, x, 0.0), 1e-10 * across.hypot(z));
+    UnitQuaternion::from_axis_angle(&axis.unwrap_or(Vector3::x_axis()), across.atan2(z))
 }

@@ -1,6 +1,6 @@
 //! Files within files: what they hold takes the place of the element that includes them.
 
-use super::super::file::{DEEPEST, parse_error};
+use super::super::file::{DEEPEST, document};
 use super::element::Element;
 use crate::{Error, Result};
 use roxmltree::{Document, Node};
@@ -111,8 +111,7 @@ impl Includes {
             action: "read",
             source,
         })?;
-        let document = Document::parse(&text)
-            .map_err(|e| parse_error(path, format!("{e}; this is not XML yet")))?;
+        let document = document(path, &text)?;
         let file = Rc::from(path.as_path());
         self.children(document.root_element(), &file, depth)
     }

@@ -11,7 +11,7 @@ use nalgebra::Matrix3;
 impl Made<'_> {
     /// Mass and inertia of a body in its own axes: as given, or of its geoms, with the least that the file asks for.
     pub(super) fn mass(
-        &self,
+        &mut self,
         body: &Body,
         of: &str,
         geometries: &Geometries,
@@ -26,11 +26,11 @@ impl Made<'_> {
         let density = self.model.compiler.inertia_density;
         let found = match &body.inertial {
             _ if from_geoms => {
-                let each = solids.iter();
-                let parts = each.map(|(geom, solid)| geometries.inertial(geom, solid, density));
-                let parts = parts
-                    .filter_map(Result::transpose)
-                    .collect::<Result<Vec<_>>>()?;
+                let notes = &mut self.file.notes;
+                let mut parts = Vec::new();
+                for (geom, solid) in solids {
+                    parts.extend(geometries.inertial(geom, solid, density, notes)?);
+                }
                 Inertial::together(&parts)
             }
             Some(given) => self.inertial(of, given)?,

@@ -7,6 +7,7 @@
 mod attributes;
 mod classes;
 mod element;
+mod equalities;
 mod flat;
 mod geometry;
 mod includes;
@@ -20,7 +21,6 @@ use crate::{Error, Result};
 use geometry::{Geometries, Solid, isometry};
 use left_out::LeftOut;
 use mjcf_rs::body::{Body, Joint, JointType};
-use mjcf_rs::equality::Equality;
 use mjcf_rs::{BodyId, Model, Tristate};
 use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Document;
@@ -36,19 +36,20 @@ pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
     // Files of meshes are looked for from the folder of this file, wherever they are named.
     let folder = path.parent().unwrap_or(Path::new(""));
     let model = guarded(path, "an MJCF file", || Model::from_str(&text, folder))?;
+    let robot = urdf_rs::Robot {
+        name: model.name.clone().unwrap_or_else(|| "robot".into()),
+        version: None,
+        links: Vec::new(),
+        joints: Vec::new(),
+        materials: Vec::new(),
+    };
     let mut made = Made {
         path,
         model: &model,
-        file: File::new(
-            path,
-            urdf_rs::Robot {
-                name: model.name.clone().unwrap_or_else(|| "robot".into()),
-                version: None,
-                links: Vec::new(),
-                joints: Vec::new(),
-                materials: Vec::new(),
-            },
-        ),
+        file: File {
+            coupled_by: "<equality>",
+            ..File::new(path, robot)
+        },
         taken: HashSet::new(),
         names: Vec::new(),
         frames: Vec::new(),
@@ -292,6 +293,7 @@ impl Made<'_> {
             JointType::Free => (urdf_rs::JointType::Floating, false),
         };
         let rises = given.range.is_some_and(|[lower, upper]| lower < upper);
+        self.check_range(given, &place, one, rises)?;
         let limited = (given.limited).resolve(self.model.compiler.autolimits, rises);
         if limited && !one {
             let note = format!("{place}: the range of a ball joint isn't read");
@@ -336,6 +338,30 @@ impl Made<'_> {
                 start: given.ref_,
             };
             self.file.extras.insert(name, extra);
+        }
+        Ok(())
+    }
+
+    /// Refuses limits without a range, and tells of a range that is none.
+    fn check_range(&mut self, given: &Joint, place: &str, one: bool, rises: bool) -> Result<()> {
+        let range = given.range.filter(|range| *range != [0.0; 2]);
+        if rises || !one || given.limited == Tristate::False {
+            return Ok(());
+        }
+        let unit = match given.type_ {
+            JointType::Slide => "m",
+            _ => "rad",
+        };
+        let told = range.map_or("no range".into(), |[lower, upper]| {
+            format!("a range from {lower} to {upper} {unit}")
+        });
+        if given.limited == Tristate::True {
+            let remedy = "limited=\"true\" needs a range whose second number is the larger one";
+            return Err(self.wrong(&format!("{place}: range"), told, remedy));
+        }
+        if range.is_some() {
+            let note = format!("{place}: it has no limits, as {told} doesn't rise");
+            self.file.notes.push(note);
         }
         Ok(())
     }
@@ -405,50 +431,5 @@ impl Made<'_> {
             };
         }
         Ok(())
-    }
-
-    /// Joints that follow others, and what isn't read.
-    fn equalities(&mut self) {
-        for equality in &self.model.equality {
-            let what = match equality {
-                Equality::Connect(_) => "connect",
-                Equality::Weld(_) => "weld",
-                Equality::Tendon(_) => "tendon",
-                Equality::Joint(joint) if !joint.common.active => "joint that isn't active",
-                Equality::Joint(joint) => {
-                    let curve = joint.polycoef;
-                    let straight = curve[2..].iter().all(|c| *c == 0.0);
-                    let named =
-                        |name: &str| self.file.robot.joints.iter().position(|j| j.name == name);
-                    let follower = named(&joint.joint1);
-                    let leader = joint.joint2.as_deref().filter(|name| named(name).is_some());
-                    let led = |follower: usize| self.file.robot.joints[follower].mimic.is_some();
-                    match (follower, leader, straight) {
-                        (Some(follower), _, _) if led(follower) => {
-                            "joint that follows a second one"
-                        }
-                        (Some(follower), Some(leader), true) => {
-                            // y − y₀ = a₀ + a₁ (x − x₀), y that of the first joint.
-                            let zero = |name: &str| {
-                                let found = self.model.joint_by_name(name);
-                                found.map_or(0.0, |(b, j)| self.model.bodies[b].body.joints[j].ref_)
-                            };
-                            let offset = zero(&joint.joint1) + curve[0] - curve[1] * zero(leader);
-                            self.file.robot.joints[follower].mimic = Some(urdf_rs::Mimic {
-                                joint: leader.into(),
-                                multiplier: Some(curve[1]),
-                                offset: Some(offset),
-                            });
-                            continue;
-                        }
-                        _ => "joint, but one that follows another in a straight line",
-                    }
-                }
-            };
-            let note = format!("an <equality> of the kind {what} isn't read");
-            if !self.file.notes.contains(&note) {
-                self.file.notes.push(note);
-            }
-        }
     }
 }

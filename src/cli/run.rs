@@ -73,6 +73,8 @@ pub(super) struct GapReport {
     pub added_mass_error: f64,
     /// Relative.
     pub force_error: f64,
+    /// The force, by panels, as a part of ½ M u²/h.
+    pub force_share: f64,
 }
 
 impl From<GapCheck> for GapReport {
@@ -80,6 +82,7 @@ impl From<GapCheck> for GapReport {
         Self {
             added_mass_error: check.added_mass_error(),
             force_error: check.force_error(),
+            force_share: check.force_share(),
             check,
         }
     }
@@ -421,11 +424,12 @@ impl fmt::Display for RunReport {
         if let Some(gap) = &self.gap_check {
             writeln!(
                 f,
-                "  there, at t = {} s, against coupled panels ({} faces): added mass {:+.2} %, force {:+.2} %",
+                "  there, at t = {} s, against coupled panels ({} faces): added mass {:+.2} %, force {:+.2} % of a force that is {:.2} % of M u²/2h",
                 readable(gap.check.time),
                 gap.check.faces,
                 1e2 * gap.added_mass_error,
-                1e2 * gap.force_error
+                1e2 * gap.force_error,
+                1e2 * gap.force_share
             )?;
         }
         if let Some(flow) = &self.gap_flow {

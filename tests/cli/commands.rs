@@ -380,8 +380,15 @@ fn the_smallest_gap_is_compared_with_panels() {
     for error in ["added_mass_error", "force_error"] {
         assert!(check[error].as_f64().unwrap().abs() < 0.2, "{error}");
     }
+    let panels = |of: &str| check[of][1].as_f64().unwrap();
+    let share = panels("slope").abs() * check["gap"].as_f64().unwrap() / panels("added_mass");
+    let told = check["force_share"].as_f64().unwrap();
+    assert!(told > 0.0 && (told / share - 1.0).abs() < 1e-9, "{told}");
     let plain = hydrograd(&[&run[..], &["--check-gap"]].concat());
-    assert!(text(&plain.stdout).contains("against coupled panels"));
+    crate::support::says(
+        text(&plain.stdout),
+        &["against coupled panels", "% of M u²/2h"],
+    );
 }
 
 #[test]

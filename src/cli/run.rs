@@ -137,6 +137,9 @@ pub(super) struct RunReport {
     pub warnings: Vec<String>,
     /// What was written.
     pub files: Vec<PathBuf>,
+    /// Why other files that were asked for weren't.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
 }
 
 impl RunReport {
@@ -178,7 +181,7 @@ pub(super) fn main(
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
-    arguments.export.prepare()?;
+    arguments.export.prepare(&scene)?;
     let earlier = arguments.resume.as_deref().map(Earlier::read).transpose()?;
     interrupt::listen();
     let progress = progress_bar("steps", scene.steps);
@@ -201,25 +204,28 @@ pub(super) fn main(
         kept = Some(files[1].clone());
         report.files = files.into();
     }
-    match arguments.export.write(&rollout) {
-        Ok(files) => report.files.extend(files),
-        // Why the run ended is said besides.
-        Err(error) if halted.is_some() => output.error(&error),
-        Err(error) => return Err(error),
+    let (files, lost) = arguments.export.write(&rollout);
+    report.files.extend(files);
+    // In JSON it is in the report, or left to why the run ended: there is one object.
+    for error in lost {
+        output.error_for_people(&error);
+        report.lost.push(error.to_string());
     }
     // After what is kept, which neither a failure nor Ctrl-C may cost: it takes long.
     report.look_at_gap(&rollout, arguments.check_gap && halted.is_none());
     match arguments.record(videos, rollout) {
         Ok(files) => report.files.extend(files),
-        Err(why) if halted.is_some() => output.error_for_people(&why),
         Err(why) => {
-            output.error(&why);
-            return Ok(Exit::Failed);
+            output.error_for_people(&why);
+            report.lost.push(why);
         }
     }
     let Some(halted) = halted else {
         output.result(&report);
-        return Ok(Exit::Done);
+        return Ok(match report.lost.is_empty() {
+            true => Exit::Done,
+            false => Exit::Failed,
+        });
     };
     let steps = recording.time.len() - 1;
     let kept = kept.map_or("nothing is kept without --out".into(), |file: PathBuf| {
@@ -335,6 +341,7 @@ fn simulate(
         final_v: last.v.as_slice().to_vec(),
         warnings: [simulator.warnings(), &rollout.warnings()].concat(),
         files: Vec::new(),
+        lost: Vec::new(),
     };
     Ok(Made {
         report,

@@ -1133,7 +1133,7 @@ class Rollout:
         every: int | None = None,
         colors: Mapping[str, str] | None = None,
     ) -> Path:
-        """Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
+        """Writes an animated scene in glTF 2.0, to a name that ends in `.glb`, which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
         the first state; the node `hydrograd` above all turns z up. `colors` are "#rrggbb" by the names of bodies; frames are those of `write_vtk`. A file that stands there is replaced."""
     def summary(self) -> dict[str, Any]:
         """Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water

@@ -625,7 +625,7 @@ impl Rollout {
         output::write_vtk(py, &self.inner, folder, frames, more, flow, streamlines)
     }
 
-    /// Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
+    /// Writes an animated scene in glTF 2.0, to a name that ends in `.glb`, which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
     /// the first state; the node `hydrograd` above all turns z up. `colors` are "#rrggbb" by the names of bodies; frames are those of `write_vtk`. A file that stands there is replaced.
     #[pyo3(signature = (path, *, frames_per_second=None, every=None, colors=None))]
     fn write_gltf(

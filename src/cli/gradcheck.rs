@@ -81,7 +81,14 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     let report = check(&scene, arguments, done)?;
     drop(progress);
     output.result(&report);
-    Ok(if report.ok { Exit::Done } else { Exit::Failed })
+    if report.ok {
+        return Ok(Exit::Done);
+    }
+    output.error_for_people(&format_args!(
+        "the gradient isn't that of differences: relative error {:.2e}, the limit is {LIMIT:.0e}",
+        report.max_rel_error
+    ));
+    Ok(Exit::Failed)
 }
 
 /// The check at a tight tolerance, then the times at the usual one.

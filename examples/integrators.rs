@@ -6,7 +6,7 @@ use hydrograd::adjoint::lie::Vec6;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Scene, Shape, Spring};
 use hydrograd::simulate::Sample;
-use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
+use hydrograd::{Controls, Error, Fidelity, Result, Rollout, Settings, Simulator};
 use std::path::Path;
 use std::time::Instant;
 
@@ -300,20 +300,41 @@ fn cost() -> Result<()> {
     Ok(())
 }
 
+/// Scenes whose energy and momentum are conserved.
+const CONSERVED: [&str; 4] = ["coins", "two_spheres", "cube", "kirchhoff_ellipsoid"];
+
+/// Faces a body, and what is printed alone.
+fn asked(given: &[String]) -> Result<(usize, Option<&str>)> {
+    let faces = given.first().map_or(Ok(320), |text| {
+        let usage = "must be a whole number above zero: integrators [FACES [SCENE]]";
+        let above = text.parse().ok().filter(|faces| *faces > 0);
+        above.ok_or_else(|| Error::input("FACES", text, usage))
+    })?;
+    let known = [&CONSERVED[..], &["falling_ball", "long", "cost"]].concat();
+    let only = given.get(1).map(String::as_str);
+    match only.filter(|name| !known.contains(name)) {
+        Some(name) => Err(Error::input(
+            "SCENE",
+            name,
+            format!("must be one of {known:?}"),
+        )),
+        None => Ok((faces, only)),
+    }
+}
+
 fn main() -> Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let faces = arguments.next().map_or(320, |f| f.parse().unwrap_or(320));
-    let only = arguments.next();
-    match only.as_deref() {
+    let given: Vec<String> = std::env::args().skip(1).collect();
+    let (faces, only) = asked(&given)?;
+    match only {
         Some("long") => return long(),
         Some("cost") => return cost(),
         _ => {}
     }
-    let wanted = |name: &str| only.as_deref().is_none_or(|o| o == name);
+    let wanted = |name: &str| only.is_none_or(|o| o == name);
     println!(
         "| scene | integrator | energy error | momentum drift | time |\n|---|---|---|---|---|"
     );
-    for name in ["coins", "two_spheres", "cube", "kirchhoff_ellipsoid"] {
+    for name in CONSERVED {
         if wanted(name) {
             conserved(name, Fidelity::Full, None, faces)?;
         }
@@ -332,5 +353,21 @@ fn main() -> Result<()> {
     if only.is_none() {
         orders()?;
     }
+    Ok(())
+}
+
+#[test]
+fn what_is_not_understood_is_an_error() -> Result<()> {
+    let of = |given: &[&str]| given.iter().map(|s| s.to_string()).collect::<Vec<_>>();
+    for (given, word) in [
+        (&["long"][..], "FACES"),
+        (&["0"], "FACES"),
+        (&["80", "lng"], "SCENE"),
+    ] {
+        let said = asked(&of(given)).unwrap_err().to_string();
+        assert!(said.contains(word), "{said}");
+    }
+    assert_eq!(asked(&[])?, (320, None));
+    assert_eq!(asked(&of(&["80", "long"]))?, (80, Some("long")));
     Ok(())
 }

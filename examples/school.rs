@@ -12,7 +12,7 @@ use hydrograd::objective::Objective;
 use hydrograd::output::gltf;
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
 use hydrograd::simulate::Cotangents;
-use hydrograd::{Controls, Fidelity, Result, Rollout, Settings, Simulator};
+use hydrograd::{Controls, Error, Fidelity, Result, Rollout, Settings, Simulator};
 use nalgebra::{DMatrix, Vector3};
 use std::path::Path;
 use std::time::Instant;
@@ -131,16 +131,16 @@ fn told(name: &str, rollout: &Rollout, started: Instant) {
     );
 }
 
+/// A number of bodies.
+fn number(text: &str) -> Result<usize> {
+    let usage = "must be a whole number above zero: school [BODIES [FOLDER]]";
+    let above = text.parse().ok().filter(|bodies| *bodies > 0);
+    above.ok_or_else(|| Error::input("BODIES", text, usage))
+}
+
 fn main() -> Result<()> {
     let given: Vec<String> = std::env::args().skip(1).collect();
-    let bodies = match given.first().map(|n| n.parse()) {
-        None => 1000,
-        Some(Ok(bodies)) if bodies > 0 => bodies,
-        Some(_) => {
-            eprintln!("usage: school [BODIES [FOLDER]], BODIES at least 1");
-            return Ok(());
-        }
-    };
+    let bodies = given.first().map_or(Ok(1000), |n| number(n))?;
     let write = |name: &str, rollout: &Rollout| match given.get(1) {
         Some(folder) => gltf::write(rollout, &Path::new(folder).join(name), &Default::default()),
         None => Ok(()),
@@ -176,6 +176,16 @@ fn main() -> Result<()> {
         "the centre goes {:.2} times as far",
         (pushed.value(&Moved)? / still).sqrt()
     );
+    Ok(())
+}
+
+#[test]
+fn what_is_no_number_of_bodies_is_an_error() -> Result<()> {
+    for wrong in ["abc", "0", "-1", "1.5"] {
+        let said = number(wrong).unwrap_err().to_string();
+        assert!(said.contains("BODIES") && said.contains(wrong), "{said}");
+    }
+    assert_eq!(number("60")?, 60);
     Ok(())
 }
 

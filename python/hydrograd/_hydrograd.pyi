@@ -991,7 +991,8 @@ class Rollout:
     def check_gap(self) -> dict[str, Any] | None:
         """The water across the smallest gap of the trajectory, beside that of coupled panels: a dictionary with `time` (s), `gap` (m), `bodies` (names; of
         the second None for a wall), `added_mass` (along the gap, by this rollout and by panels, kg), `slope` (the same of its slope, kg/m),
-        `added_mass_error` and `force_error` (relative) and `faces` (of the panels). None where there is no gap, no water, and where the rollout is by coupled
+        `added_mass_error` and `force_error` (relative), `force_share` (the force by panels as a part of M u²/2h, that of an added mass M that goes as the inverse
+        of the gap h, at a speed u across it) and `faces` (of the panels). None where there is no gap, no water, and where the rollout is by coupled
         panels already. It takes their setup and a solve."""
     def gap_flow(self) -> dict[str, Any] | None:
         """Which of inertia and viscosity rules the water in the smallest gap of the trajectory, whether or not viscous water acts there: a dictionary with `time`
@@ -1132,7 +1133,7 @@ class Rollout:
         every: int | None = None,
         colors: Mapping[str, str] | None = None,
     ) -> Path:
-        """Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
+        """Writes an animated scene in glTF 2.0, to a name that ends in `.glb`, which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
         the first state; the node `hydrograd` above all turns z up. `colors` are "#rrggbb" by the names of bodies; frames are those of `write_vtk`. A file that stands there is replaced."""
     def summary(self) -> dict[str, Any]:
         """Figures of the whole trajectory: energies (J), drift of momentum (relative), iterations, smallest gap (m), by what the water

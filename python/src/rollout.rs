@@ -180,7 +180,8 @@ impl Rollout {
 
     /// The water across the smallest gap of the trajectory, beside that of coupled panels: a dictionary with `time` (s), `gap` (m), `bodies` (names; of
     /// the second None for a wall), `added_mass` (along the gap, by this rollout and by panels, kg), `slope` (the same of its slope, kg/m),
-    /// `added_mass_error` and `force_error` (relative) and `faces` (of the panels). None where there is no gap, no water, and where the rollout is by coupled
+    /// `added_mass_error` and `force_error` (relative), `force_share` (the force by panels as a part of M u²/2h, that of an added mass M that goes as the inverse
+    /// of the gap h, at a speed u across it) and `faces` (of the panels). None where there is no gap, no water, and where the rollout is by coupled
     /// panels already. It takes their setup and a solve.
     fn check_gap<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let inner = self.inner.clone();
@@ -190,6 +191,7 @@ impl Rollout {
         let out = PyDict::new(py);
         out.set_item("added_mass_error", check.added_mass_error())?;
         out.set_item("force_error", check.force_error())?;
+        out.set_item("force_share", check.force_share())?;
         out.set_item("time", check.time)?;
         out.set_item("gap", check.gap)?;
         out.set_item("bodies", check.bodies)?;
@@ -623,7 +625,7 @@ impl Rollout {
         output::write_vtk(py, &self.inner, folder, frames, more, flow, streamlines)
     }
 
-    /// Writes an animated scene in glTF 2.0 (`.glb`), which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
+    /// Writes an animated scene in glTF 2.0, to a name that ends in `.glb`, which Blender and browsers open, and gives its path: a node each body, moved between frames, and walls. Lengths are m and times s, counted from
     /// the first state; the node `hydrograd` above all turns z up. `colors` are "#rrggbb" by the names of bodies; frames are those of `write_vtk`. A file that stands there is replaced.
     #[pyo3(signature = (path, *, frames_per_second=None, every=None, colors=None))]
     fn write_gltf(

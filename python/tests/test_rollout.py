@@ -101,6 +101,7 @@ def test_the_smallest_gap_is_compared_with_panels():
     assert np.isclose(check["added_mass_error"], run / panels - 1.0) and 0.01 < check["added_mass_error"] < 0.1
     run, panels = check["slope"]
     assert np.isclose(check["force_error"], run / panels - 1.0) and 0.1 < check["force_error"] < 0.6
+    assert np.isclose(check["force_share"], abs(panels) * check["gap"] / check["added_mass"][1])
     assert hg.Simulator(scene, fidelity="full", faces=320).rollout(steps=1).check_gap() is None
     # The film in the gap is most of what was missing.
     film = hg.Simulator(scene, fidelity="reduced", faces=320).rollout(steps=1).check_gap()

@@ -1,12 +1,14 @@
 //! `hydrograd check-mesh`: whether a mesh can be simulated.
 
+#[cfg(feature = "meshio")]
+use std::path::Path;
 use std::path::PathBuf;
 
 use clap::Args;
 
 use super::exit::Exit;
 use super::output::Output;
-use crate::Result;
+use crate::{Error, Result};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -29,6 +31,15 @@ pub(super) struct Arguments {
 /// Prints the report, good or bad; a bad mesh is a failure of the command as well.
 #[cfg(feature = "meshio")]
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
+    if let Some(hull) = &arguments.hull
+        && is_same(hull, &arguments.file)
+    {
+        return Err(Error::input(
+            "--hull",
+            hull.display().to_string(),
+            "is the mesh that is checked, which would be lost: give another name",
+        ));
+    }
     let mesh = crate::shape::file::read_unchecked(&arguments.file, arguments.scale)?;
     let report = mesh.check();
     let error = report.clone().into_result().err();
@@ -60,9 +71,16 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     Ok(Exit::Failed)
 }
 
+/// Whether two paths are of one file that there is.
+#[cfg(feature = "meshio")]
+fn is_same(a: &Path, b: &Path) -> bool {
+    let found = a.canonicalize().ok();
+    found.is_some() && found == b.canonicalize().ok()
+}
+
 #[cfg(not(feature = "meshio"))]
 pub(super) fn main(arguments: &Arguments, _output: Output) -> Result<Exit> {
-    Err(crate::Error::Unsupported {
+    Err(Error::Unsupported {
         what: format!("reading {}", arguments.file.display()),
         why: "this build leaves out mesh files".into(),
         instead: "build with the feature `meshio`".into(),

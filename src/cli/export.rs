@@ -1,14 +1,16 @@
 //! `hydrograd run --vtk --gltf`: a run as files of other programs.
 
-use clap::Args;
-use std::path::PathBuf;
+use clap::{ArgGroup, Args};
+use std::path::{Path, PathBuf};
 
 use super::options::{length, rate};
-use crate::Result;
 use crate::output::{Frames, gltf, vtk};
+use crate::scene::Scene;
 use crate::simulate::{Recording, Rollout, StreamlineSettings};
+use crate::{Error, Result};
 
 #[derive(Clone, Debug, Args)]
+#[command(group(ArgGroup::new("animated").args(["vtk", "gltf"]).multiple(true)))]
 pub(super) struct Export {
     /// Folder for files of VTK, which ParaView opens: bodies.pvd with velocities of all faces, walls.vtp [default: none are written]. They hold the steps
     /// made now, as does --gltf.
@@ -37,13 +39,20 @@ pub(super) struct Export {
     #[arg(long, value_name = "FILE.glb")]
     gltf: Option<PathBuf>,
     /// Frames in a second of simulated time, at most, of --vtk and --gltf.
-    #[arg(long, value_name = "N", value_parser = rate, default_value = "30", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = rate, requires = "animated", default_value = "30", allow_negative_numbers = true)]
     frames_per_second: f64,
 }
 
 impl Export {
-    /// Tries to write where files are to be, so that a long run isn't lost to a wrong path.
-    pub fn prepare(&self) -> Result<()> {
+    /// Tries to write where files are to be, and refuses what a scene can't have in them, so that a long run isn't lost to a wrong path or wish.
+    pub fn prepare(&self, scene: &Scene) -> Result<()> {
+        if self.vtk_pressure && scene.fluid.density == 0.0 {
+            return Err(Error::input(
+                "--vtk-pressure: fluid.density",
+                scene.fluid.density,
+                "must be above zero: without water there is no pressure",
+            ));
+        }
         if let Some(folder) = &self.vtk {
             Recording::prepare(folder)?;
         }
@@ -53,32 +62,44 @@ impl Export {
         Ok(())
     }
 
-    /// Writes what was asked for, and gives the files to open.
-    pub fn write(&self, rollout: &Rollout) -> Result<Vec<PathBuf>> {
-        let frames = Frames::PerSecond(self.frames_per_second);
-        let mut files = Vec::new();
+    /// Writes what was asked for: gives the files to open, and why others couldn't be written.
+    pub fn write(&self, rollout: &Rollout) -> (Vec<PathBuf>, Vec<Error>) {
+        let (mut files, mut lost) = (Vec::new(), Vec::new());
         if let Some(folder) = &self.vtk {
-            let options = vtk::Options {
-                frames,
-                loads: self.vtk_loads,
-                pressure: self.vtk_pressure,
-                flow: None,
-                streamlines: (!self.vtk_seed.is_empty()).then(|| vtk::Streamlines {
-                    seeds: self.vtk_seed.clone(),
-                    settings: StreamlineSettings::new(self.vtk_line_length),
-                }),
-            };
-            files.extend(vtk::write(rollout, folder, &options)?);
+            match self.write_vtk(rollout, folder) {
+                Ok(written) => files.extend(written),
+                Err(error) => lost.push(error),
+            }
         }
         if let Some(file) = &self.gltf {
             let options = gltf::Options {
-                frames,
+                frames: self.frames(),
                 ..gltf::Options::default()
             };
-            gltf::write(rollout, file, &options)?;
-            files.push(file.clone());
+            match gltf::write(rollout, file, &options) {
+                Ok(()) => files.push(file.clone()),
+                Err(error) => lost.push(error),
+            }
         }
-        Ok(files)
+        (files, lost)
+    }
+
+    fn write_vtk(&self, rollout: &Rollout, folder: &Path) -> Result<Vec<PathBuf>> {
+        let options = vtk::Options {
+            frames: self.frames(),
+            loads: self.vtk_loads,
+            pressure: self.vtk_pressure,
+            flow: None,
+            streamlines: (!self.vtk_seed.is_empty()).then(|| vtk::Streamlines {
+                seeds: self.vtk_seed.clone(),
+                settings: StreamlineSettings::new(self.vtk_line_length),
+            }),
+        };
+        vtk::write(rollout, folder, &options)
+    }
+
+    fn frames(&self) -> Frames {
+        Frames::PerSecond(self.frames_per_second)
     }
 }
 

@@ -144,14 +144,19 @@ impl RobotArguments {
         if is_urdf(path) {
             return Scene::from_urdf(path, &self.robot());
         }
-        if self.robot() != Robot::default() {
-            return Err(Error::input(
-                path.display().to_string(),
-                "choices for a robot's file",
-                "a scene file says them in its [[robot]] (`package_path`, `base`, `shape`, `mimic`, `bad_meshes`, `limits`)",
-            ));
-        }
+        self.refuse(
+            path.display().to_string(),
+            "a scene file says them in its [[robot]] (`package_path`, `base`, `shape`, `mimic`, `bad_meshes`, `limits`)",
+        )?;
         Scene::load(path)
+    }
+
+    /// Refuses choices for a place that isn't a robot's file.
+    pub fn refuse(&self, place: String, expected: &str) -> Result<()> {
+        match self.robot() == Robot::default() {
+            true => Ok(()),
+            false => Err(Error::input(place, "choices for a robot's file", expected)),
+        }
     }
 }
 

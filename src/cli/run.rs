@@ -73,6 +73,8 @@ pub(super) struct GapReport {
     pub added_mass_error: f64,
     /// Relative.
     pub force_error: f64,
+    /// The force, by panels, as a part of ½ M u²/h.
+    pub force_share: f64,
 }
 
 impl From<GapCheck> for GapReport {
@@ -80,6 +82,7 @@ impl From<GapCheck> for GapReport {
         Self {
             added_mass_error: check.added_mass_error(),
             force_error: check.force_error(),
+            force_share: check.force_share(),
             check,
         }
     }
@@ -134,6 +137,9 @@ pub(super) struct RunReport {
     pub warnings: Vec<String>,
     /// What was written.
     pub files: Vec<PathBuf>,
+    /// Why other files that were asked for weren't.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
 }
 
 impl RunReport {
@@ -175,7 +181,7 @@ pub(super) fn main(
     if let Some(folder) = &arguments.out {
         Recording::prepare(folder)?;
     }
-    arguments.export.prepare()?;
+    arguments.export.prepare(&scene)?;
     let earlier = arguments.resume.as_deref().map(Earlier::read).transpose()?;
     interrupt::listen();
     let progress = progress_bar("steps", scene.steps);
@@ -198,25 +204,28 @@ pub(super) fn main(
         kept = Some(files[1].clone());
         report.files = files.into();
     }
-    match arguments.export.write(&rollout) {
-        Ok(files) => report.files.extend(files),
-        // Why the run ended is said besides.
-        Err(error) if halted.is_some() => output.error(&error),
-        Err(error) => return Err(error),
+    let (files, lost) = arguments.export.write(&rollout);
+    report.files.extend(files);
+    // In JSON it is in the report, or left to why the run ended: there is one object.
+    for error in lost {
+        output.error_for_people(&error);
+        report.lost.push(error.to_string());
     }
     // After what is kept, which neither a failure nor Ctrl-C may cost: it takes long.
     report.look_at_gap(&rollout, arguments.check_gap && halted.is_none());
     match arguments.record(videos, rollout) {
         Ok(files) => report.files.extend(files),
-        Err(why) if halted.is_some() => output.error_for_people(&why),
         Err(why) => {
-            output.error(&why);
-            return Ok(Exit::Failed);
+            output.error_for_people(&why);
+            report.lost.push(why);
         }
     }
     let Some(halted) = halted else {
         output.result(&report);
-        return Ok(Exit::Done);
+        return Ok(match report.lost.is_empty() {
+            true => Exit::Done,
+            false => Exit::Failed,
+        });
     };
     let steps = recording.time.len() - 1;
     let kept = kept.map_or("nothing is kept without --out".into(), |file: PathBuf| {
@@ -332,6 +341,7 @@ fn simulate(
         final_v: last.v.as_slice().to_vec(),
         warnings: [simulator.warnings(), &rollout.warnings()].concat(),
         files: Vec::new(),
+        lost: Vec::new(),
     };
     Ok(Made {
         report,
@@ -421,11 +431,12 @@ impl fmt::Display for RunReport {
         if let Some(gap) = &self.gap_check {
             writeln!(
                 f,
-                "  there, at t = {} s, against coupled panels ({} faces): added mass {:+.2} %, force {:+.2} %",
+                "  there, at t = {} s, against coupled panels ({} faces): added mass {:+.2} %, force {:+.2} % of a force that is {:.2} % of M u²/2h",
                 readable(gap.check.time),
                 gap.check.faces,
                 1e2 * gap.added_mass_error,
-                1e2 * gap.force_error
+                1e2 * gap.force_error,
+                1e2 * gap.force_share
             )?;
         }
         if let Some(flow) = &self.gap_flow {

@@ -14,7 +14,7 @@ use super::output::{Output, progress_bar, set_progress};
 use crate::Result;
 use crate::dynamics::Integrator;
 use crate::simulate::{Fidelity, Method};
-use crate::tradeoff::{self, TradeoffProgress, TradeoffSettings, TradeoffStage};
+use crate::tradeoff::{self, Tradeoff, TradeoffProgress, TradeoffSettings, TradeoffStage};
 use table::TradeoffReport;
 
 #[derive(Debug, Args)]
@@ -123,14 +123,35 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
             Err(error) => lost = Some(error),
         }
     }
-    let measured = found.rows.iter().any(|r| r.added_mass_rel_error.is_some());
+    let nothing = nothing_measured(&found);
     output.result(&TradeoffReport::new(found, files));
     // What took the time is said all the same.
     if let Some(error) = &lost {
         output.error_for_people(error);
     }
-    Ok(match measured && lost.is_none() {
+    if let Some(why) = &nothing {
+        output.error_for_people(why);
+    }
+    Ok(match nothing.is_none() && lost.is_none() {
         true => Exit::Done,
         false => Exit::Failed,
+    })
+}
+
+/// Why no configuration has an error of its added mass, if none has.
+fn nothing_measured(found: &Tradeoff) -> Option<String> {
+    if (found.rows.iter()).any(|r| r.added_mass_rel_error.is_some()) {
+        return None;
+    }
+    let failed = found.rows.iter().find_map(|row| {
+        let error = row.error.as_ref()?;
+        Some(format!("{}: {error}", row.configuration.label()))
+    });
+    Some(match failed {
+        Some(first) => format!("no configuration could be measured, the first of them {first}"),
+        None => format!(
+            "no configuration was measured within the budget of {} s: give a longer --budget",
+            found.budget
+        ),
     })
 }

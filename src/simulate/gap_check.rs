@@ -33,9 +33,15 @@ impl GapCheck {
         self.added_mass[0] / self.added_mass[1] - 1.0
     }
 
-    /// Error of the slope, and so of the force.
+    /// Error of the slope, and so of the force, relative to that of panels: it says little where that force is next to none
+    /// ([`GapCheck::force_share`]).
     pub fn force_error(&self) -> f64 {
         self.slope[0] / self.slope[1] - 1.0
+    }
+
+    /// The force by panels as a part of that of an added mass that goes as the inverse of the gap h, ½ M u²/h at a speed u across it: |slope| h/M.
+    pub fn force_share(&self) -> f64 {
+        self.slope[1].abs() * self.gap / self.added_mass[1]
     }
 }
 

@@ -75,11 +75,8 @@ impl WaterChoices {
         let chosen = solve.preconditioner != usual.preconditioner;
         let reach = solve.csd24_rho != usual.csd24_rho;
         let mut out = Vec::new();
-        let mut told = |name: &str, with: String, who: &str| {
-            out.push(format!(
-                "the setting {name} has no effect with {with}: {who}"
-            ));
-        };
+        let mut told =
+            |name: &str, with: String, who: &str| out.push(without_effect(name, &with, who));
         for (name, given) in [("preconditioner", chosen), ("csd24_rho", reach)] {
             let who = "only full by fundamental solutions takes it";
             if given && !by_sources {
@@ -109,41 +106,73 @@ impl WaterChoices {
         out
     }
 
-    /// Choices that the backend or the fidelity doesn't look at.
-    pub(crate) fn without_effect(&self) -> Vec<String> {
-        use super::fidelity::Knob::{Films, Rank, ResolvedGap};
+    /// Choices that the backend, the fidelity or the method doesn't look at; `cached`: whether compressed bodies are to be kept in a folder.
+    pub(crate) fn without_effect(&self, cached: bool) -> Vec<String> {
+        use super::fidelity::Knob::{Accuracy, Films, Rank, ResolvedGap, Tolerance};
+        const REDUCED: &str = "only reduced takes it";
+        const COMPRESSED: &str = "only reduced and auto take it";
+        const FILMED: &str = "only reduced, auto, and full by panels take it";
         let mut out = Vec::new();
         if self.backend == Backend::Cpu && self.gpu != GpuSettings::default() {
             out.push("the settings of the GPU have no effect with the backend cpu".into());
         }
         out.extend(self.preconditioner_without_effect());
-        let compress = &self.numerics.compress;
-        let alone = self.fidelity.kind().solves_alone();
-        for (name, knob, given) in [
-            ("rank", Rank, compress.rank.is_some()),
-            ("resolved_gap", ResolvedGap, compress.resolved_gap.is_some()),
-            ("films", Films, !self.numerics.films),
-        ] {
-            if !given {
-                continue;
+        let (numerics, usual) = (&self.numerics, Numerics::default());
+        let (compress, solve, mfs) = (&numerics.compress, &numerics.solve, &numerics.mfs);
+        let method = self.method_used().kind();
+        let has = |knob| self.fidelity.knobs().contains(&knob);
+        let compresses = self.fidelity.kind().compresses();
+        let filmed = self.fidelity.kind().solves_alone() || method.has_films();
+        let mut told = |name: &str, given: bool, heeded: bool, with: &str, who: &str| {
+            if given && !heeded {
+                out.push(without_effect(name, with, who));
             }
-            let who = match knob {
-                Films => "only reduced, auto, and full by panels take it",
-                _ => "only reduced takes it",
-            };
-            let with = if !self.fidelity.knobs().contains(&knob) {
-                format!("the fidelity {}", self.fidelity)
-            } else if knob == Films && !(alone || self.method_used().kind().has_films()) {
-                format!("the method {}", self.method_used())
-            } else {
-                continue;
-            };
-            out.push(format!(
-                "the setting {name} has no effect with {with}: {who}"
-            ));
+        };
+        let with = format!("the fidelity {}", self.fidelity);
+        let mut of_fidelity = |name: &str, given: bool, heeded: bool, who: &str| {
+            told(name, given, heeded, &with, who)
+        };
+        of_fidelity("rank", compress.rank.is_some(), has(Rank), REDUCED);
+        let gap = compress.resolved_gap.is_some();
+        of_fidelity("resolved_gap", gap, has(ResolvedGap), REDUCED);
+        of_fidelity("films", !numerics.films, has(Films), FILMED);
+        let aims = [compress.tolerance, numerics.accuracy];
+        let aimed = aims != [usual.compress.tolerance, usual.accuracy];
+        of_fidelity("accuracy", aimed, has(Accuracy), COMPRESSED);
+        let exchange = numerics.exchange != usual.exchange;
+        of_fidelity("exchange", exchange, compresses, COMPRESSED);
+        of_fidelity("cache", cached, compresses, COMPRESSED);
+        for (name, given) in [
+            ("tolerance", solve.tolerance != usual.solve.tolerance),
+            ("solver", solve.solver != usual.solve.solver),
+            (
+                "max_iterations",
+                solve.max_iterations != usual.solve.max_iterations,
+            ),
+        ] {
+            of_fidelity(name, given, has(Tolerance), "only full takes it");
+        }
+        let with = format!("the method {}", self.method_used());
+        let unfilmed = !numerics.films && has(Films);
+        told("films", unfilmed, filmed, &with, FILMED);
+        // What a preset says of its own method isn't asked of another one.
+        let asked = *mfs != Self::preset(Preset::Paper).numerics.mfs;
+        for (name, given) in [
+            ("depth", mfs.depth != usual.mfs.depth),
+            ("rows", mfs.rows != usual.mfs.rows),
+            ("readout", mfs.readout != usual.mfs.readout),
+            ("damping", mfs.damping != usual.mfs.damping),
+        ] {
+            let who = "only mfs-vertex and mfs-face take it";
+            told(name, asked && given, method.by_sources(), &with, who);
         }
         out
     }
+}
+
+/// What is said of a setting that nothing looks at.
+fn without_effect(name: &str, with: &str, who: &str) -> String {
+    format!("the setting {name} has no effect with {with}: {who}")
 }
 
 /// The surfaces of all bodies of a scene, each in its body's frame; none for a body without a shape. Equal shapes are meshed once.

@@ -105,16 +105,38 @@ impl Device {
         Ok(Full::on(model.clone(), Box::new(Cpu::new(model)?)))
     }
 
-    /// Coupled panels here.
-    pub fn panels(&mut self, coupled: PanelCoupled) -> Result<PanelCoupled> {
+    /// Coupled panels here, and those of coarser meshes where there are such: both, or the CPU has both.
+    pub fn panels(
+        &mut self,
+        fine: PanelCoupled,
+        coarse: impl FnOnce() -> Result<Option<PanelCoupled>>,
+    ) -> Result<(PanelCoupled, Option<PanelCoupled>)> {
         #[cfg(feature = "gpu")]
-        if let Some(context) = &self.context {
-            match GpuPanels::new(context, coupled.model()) {
-                Ok(gpu) => return Ok(coupled.on(Box::new(gpu))),
-                Err(error) => self.leave(error)?,
-            }
+        let first = self.uploaded(&fine)?;
+        let coarse = coarse()?;
+        #[cfg(feature = "gpu")]
+        let (fine, coarse) = {
+            let second = coarse.as_ref().map(|c| self.uploaded(c)).transpose()?;
+            // A device that was left for the second has lost the first.
+            let on = |coupled: PanelCoupled, gpu: Option<GpuPanels>| match gpu {
+                Some(gpu) if self.context.is_some() => coupled.on(Box::new(gpu)),
+                _ => coupled,
+            };
+            (on(fine, first), coarse.map(|c| on(c, second.flatten())))
+        };
+        Ok((fine, coarse))
+    }
+
+    /// Coupled panels on the open GPU, if it is open and takes them.
+    #[cfg(feature = "gpu")]
+    fn uploaded(&mut self, coupled: &PanelCoupled) -> Result<Option<GpuPanels>> {
+        let Some(context) = &self.context else {
+            return Ok(None);
+        };
+        match GpuPanels::new(context, coupled.model()) {
+            Ok(gpu) => Ok(Some(gpu)),
+            Err(error) => self.leave(error).map(|()| None),
         }
-        Ok(coupled)
     }
 
     /// Many bodies by products, whose sums are made here; `same` are the same bodies for a device.
@@ -223,5 +245,53 @@ impl From<gpu::Arithmetic> for Arithmetic {
             gpu::Arithmetic::Double => Self::Double,
             gpu::Arithmetic::Single | gpu::Arithmetic::TwoFloat => Self::TwoFloat,
         }
+    }
+}
+
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::*;
+    use crate::adjoint::lie::Pose;
+    use crate::boundary::PanelBoundary;
+    use crate::coupling::Exclusions;
+    use crate::coupling::full::SolveSettings;
+    use crate::geometry::{TriMesh, Wall};
+    use crate::scene::Shape;
+    use nalgebra::DMatrix;
+    use std::path::Path;
+
+    fn panels(mesh: &TriMesh) -> Result<PanelCoupled> {
+        let body = Arc::new(PanelBoundary::new("ball", mesh)?);
+        let floor = Wall::rigid([0.0, 0.0, -1.5], [0.0, 0.0, 1.0]);
+        let (excluded, solve) = (Exclusions::none(), SolveSettings::default());
+        PanelCoupled::new(vec![body], &[floor], excluded, solve)
+    }
+
+    /// A device that fails at the second of two meshes leaves the first one to the CPU as well.
+    #[test]
+    fn a_device_that_is_left_keeps_nothing() -> Result<()> {
+        let shape = Shape::sphere(1.0);
+        let meshes = [80, 20].map(|n| crate::shape::build(&shape, Path::new(""), Some(n)));
+        let settings = GpuSettings {
+            fallback: true,
+            ..GpuSettings::default()
+        };
+        let mut device = Device::open(Backend::Gpu, &settings, None)?;
+        let context = device.context().cloned();
+        let context = context.expect("a device, if a software one");
+        let [fine, coarse] = meshes;
+        let (fine, coarse) = device.panels(panels(&fine?)?, || {
+            context.lose();
+            panels(&coarse?).map(Some)
+        })?;
+        assert_eq!(device.report().backend_used, Backend::Cpu);
+        assert!(device.reason.is_some_and(|why| why.contains("lost")));
+        let (pose, axes) = ([Pose::identity()], DMatrix::identity(6, 6));
+        for coupled in [Some(fine), coarse] {
+            let coupled = coupled.expect("of both meshes");
+            let solved = coupled.evaluate(&pose, &axes)?;
+            assert!(solved.momenta()[(0, 0)] > 1.0);
+        }
+        Ok(())
     }
 }

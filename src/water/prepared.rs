@@ -102,7 +102,7 @@ pub(crate) fn prepare(
         clearance.refuse_touch(gaps.smallest(poses).as_ref())?;
     }
     clearance.refuse_film(poses)?;
-    let mut warnings = choices.without_effect();
+    let mut warnings = choices.without_effect(folder.is_some());
     let idle = fidelity.kind().idle_gpu();
     let mut device = Device::open(choices.backend, &choices.gpu, idle)?;
     let on_device = device.report().backend_used == Backend::Gpu;

@@ -29,9 +29,11 @@ fn matrix(done: &Output) -> (String, Vec<String>) {
         String::from_utf8_lossy(&done.stderr)
     );
     let value: Value = serde_json::from_slice(&done.stdout).unwrap();
-    let warnings = value["warnings"].as_array().unwrap().iter();
+    let (matrix, warnings) = (&value["added_mass"], &value["warnings"]);
+    assert!(matrix.is_array(), "{value}");
+    let warnings = warnings.as_array().unwrap().iter();
     (
-        value["matrix"].to_string(),
+        matrix.to_string(),
         warnings.map(|w| w.to_string()).collect(),
     )
 }
@@ -48,6 +50,9 @@ fn many_writers_leave_one_whole_file() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path().display().to_string();
     let right = matrix(&hydrograd(&SHAPE[..8]));
+    let mut other = SHAPE;
+    other[2] = "box:0.1,0.2,0.301";
+    assert_ne!(matrix(&hydrograd(&other[..8])).0, right.0);
     for _ in 0..3 {
         let mut command = command(&arguments(&place));
         command.stdout(Stdio::piped()).stderr(Stdio::piped());

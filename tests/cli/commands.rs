@@ -223,6 +223,15 @@ fn the_hull_of_a_bad_mesh_can_be_simulated() {
         1,
         &["hull.off", ".stl"],
     );
+    // Not in the place of the mesh itself, by whatever path.
+    let before = std::fs::read(&open).unwrap();
+    std::fs::create_dir(folder.path().join("sub")).unwrap();
+    let around = folder.path().join("sub/../open.obj").display().to_string();
+    for same in [&open, &around] {
+        let words = ["--hull", "open.obj", "the mesh that is checked"];
+        fails(&["check-mesh", &open, "--hull", same], 1, &words);
+    }
+    assert!(std::fs::read(&open).unwrap() == before);
 }
 
 /// All these keys hold finite numbers.
@@ -358,10 +367,14 @@ fn settings_reach_the_simulator() {
         (&plain["method"], &plain["integrator"]),
         (&"panel".into(), &"rk4".into())
     );
-    let direct = json(&[&base[..], &["--solver", "qr"]].concat());
-    for (a, b) in list(&plain["final_q"]).iter().zip(list(&direct["final_q"])) {
-        assert!((a - b).abs() <= 1e-8, "{a} {b}");
-    }
+    // What is factored takes no iterations, and has the same solution.
+    let asked = ["added-mass", &ball, "--faces", "80", "--fidelity", "full"];
+    let iterated = json(&asked);
+    let direct = json(&[&asked[..], &["--solver", "qr"]].concat());
+    assert!(iterated["iterations"].as_u64() > Some(0), "{iterated}");
+    assert_eq!(direct["iterations"], 0);
+    let [a, b] = [iterated, direct].map(|r| r["added_mass"][0][0].as_f64().unwrap());
+    assert!((a / b - 1.0).abs() <= 1e-6, "{a} {b}");
     fails(
         &[&base[..], &["--solver", "gmres", "--method", "mfs-vertex"]].concat(),
         1,
@@ -380,8 +393,15 @@ fn the_smallest_gap_is_compared_with_panels() {
     for error in ["added_mass_error", "force_error"] {
         assert!(check[error].as_f64().unwrap().abs() < 0.2, "{error}");
     }
+    let panels = |of: &str| check[of][1].as_f64().unwrap();
+    let share = panels("slope").abs() * check["gap"].as_f64().unwrap() / panels("added_mass");
+    let told = check["force_share"].as_f64().unwrap();
+    assert!(told > 0.0 && (told / share - 1.0).abs() < 1e-9, "{told}");
     let plain = hydrograd(&[&run[..], &["--check-gap"]].concat());
-    assert!(text(&plain.stdout).contains("against coupled panels"));
+    crate::support::says(
+        text(&plain.stdout),
+        &["against coupled panels", "% of M u²/2h"],
+    );
 }
 
 #[test]
@@ -458,6 +478,17 @@ fn added_mass_of_scenes_and_meshes() {
         assert!((found / half - 1.0).abs() < 0.05, "{found} for {half}");
     }
     let good = file(&folder, "corner.obj", TETRAHEDRON);
+    let choices = ["choices for a robot's file", ".urdf", "leave them out"];
+    fails(
+        &["added-mass", &good, "--wet", "none", "--bad-meshes=refuse"],
+        1,
+        &[&choices[..], &["corner.obj"]].concat(),
+    );
+    fails(
+        &["added-mass", "--shape", "sphere:0.5", "--base", "fixed"],
+        1,
+        &[&choices[..], &["--shape"]].concat(),
+    );
     let report = json(&["added-mass", &good]);
     assert_eq!(report["bodies"], serde_json::json!(["corner"]));
     assert!((report["volume"].as_f64().unwrap() - 1.0 / 6.0).abs() < 1e-12);
@@ -555,6 +586,10 @@ fn gradcheck_passes_and_tells_its_cost() {
     let report: serde_json::Value = serde_json::from_slice(&loose.stdout).unwrap();
     assert_eq!(report["ok"], false, "{report}");
     assert_eq!(loose.status.code(), Some(1));
+    crate::support::says(
+        text(&loose.stderr),
+        &["the gradient isn't", "the limit is 1e-6"],
+    );
 }
 
 const PENCIL: &str = r#"

@@ -490,6 +490,21 @@ fn the_program_writes_both() {
     fails(&refused, 1, &["taken", "write failed"]);
     let refused = [&run[..], &["--gltf", &within]].concat();
     fails(&refused, 1, &["taken", "write failed"]);
+    // What may not stand in another file's place.
+    let own = of("ball.toml");
+    fs::copy(&scene, &own).unwrap();
+    let refused = ["run", &own, "--fidelity", "isolated", "--gltf", &own];
+    fails(&refused, 1, &["ball.toml", "extension \"toml\"", ".glb"]);
+    assert!(fs::read(&own).unwrap() == fs::read(&scene).unwrap());
+    // What the scene can't have.
+    let text = fs::read_to_string(&own).unwrap();
+    assert!(text.contains("density = 998.0"));
+    fs::write(&own, text.replacen("density = 998.0", "density = 0.0", 1)).unwrap();
+    let dry = ["run", &own, "--steps", "100000000", "--vtk", &out];
+    let dry = [&dry[..], &["--vtk-pressure"]].concat();
+    fails(&dry, 1, &["--vtk-pressure", "fluid.density", "above zero"]);
+    let alone = [&run[..], &["--frames-per-second", "25"]].concat();
+    fails(&alone, 2, &["--vtk", "--gltf"]);
     for rate in ["0", "-3", "nan"] {
         let refused = [&run[..], &["--gltf", &file, "--frames-per-second", rate]].concat();
         fails(&refused, 2, &["--frames-per-second", "above zero"]);

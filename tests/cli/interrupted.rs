@@ -183,6 +183,58 @@ fn a_run_that_fails_in_a_step_keeps_what_ran() {
     fails(&arguments[..5], 1, &["nothing is kept without --out"]);
 }
 
+/// A file in the place of a folder of VTK's, which is found out when that is written.
+fn in_the_way(folder: &Path) -> [String; 2] {
+    let vtk = folder.join("vtk");
+    std::fs::create_dir(&vtk).unwrap();
+    std::fs::write(vtk.join("bodies"), "in the way").unwrap();
+    [words(&vtk), words(&folder.join("run.glb"))]
+}
+
+#[test]
+fn files_that_cannot_be_written_cost_nothing_else_of_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let [vtk, gltf] = in_the_way(folder.path());
+    let ball = scene("falling_ball");
+    let asked = ["--steps", "3", "--vtk", &vtk, "--gltf", &gltf];
+    let asked = [&base(&ball)[..], &asked].concat();
+    for form in [&[][..], &["--json"]] {
+        let done = hydrograd(&[&asked[..], form].concat());
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(1), "{said}");
+        says(said, &["bodies: write failed"]);
+        assert!(Path::new(&gltf).is_file());
+        std::fs::remove_file(&gltf).unwrap();
+        let text = String::from_utf8(done.stdout).unwrap();
+        if form.is_empty() {
+            says(text, &["smallest gap", "run.glb"]);
+            continue;
+        }
+        let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(report["steps"], 3);
+        assert_eq!(report["files"].as_array().unwrap().len(), 1);
+        says(&report["lost"][0], &["bodies: write failed"]);
+    }
+}
+
+#[test]
+fn a_run_that_fails_and_cannot_be_exported_tells_programs_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("meet.toml");
+    std::fs::write(&scene, COLLISION).unwrap();
+    let [vtk, gltf] = in_the_way(folder.path());
+    let scene = words(&scene);
+    let run = ["run", &scene, "--fidelity", "reduced", "--no-films"];
+    let asked = ["--vtk", &vtk, "--gltf", &gltf, "--json"];
+    let done = hydrograd(&[&run[..], &asked].concat());
+    assert_eq!(done.status.code(), Some(1));
+    let told: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    says(&told["error"], &["left", "right", "nothing is kept"]);
+    let said = String::from_utf8(done.stderr).unwrap();
+    says(said, &["bodies: write failed", "nothing is kept"]);
+    assert!(Path::new(&gltf).is_file());
+}
+
 /// Two balls beside each other, and a body that panels can't take: its added mass is given without a shape.
 const UNSEEN: &str = r#"
 time_step = 0.01

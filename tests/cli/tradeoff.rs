@@ -1,7 +1,6 @@
 //! `hydrograd tradeoff`.
 
 use crate::support::command::{self, hydrograd, scene};
-#[cfg(unix)]
 use crate::support::says;
 use serde_json::Value;
 
@@ -249,7 +248,14 @@ fn what_the_budget_has_no_time_for_is_said() {
     assert!(!report["left_out"].as_array().unwrap().is_empty());
     assert_eq!(report["rows"], Value::Array(Vec::new()));
     // Nothing was measured: that is no success.
-    assert_eq!(json.status.code(), Some(1));
+    for done in [plain, json] {
+        assert_eq!(done.status.code(), Some(1));
+        let said = String::from_utf8(done.stderr).unwrap();
+        says(
+            said,
+            &["no configuration was measured", "0.01 s", "--budget"],
+        );
+    }
 }
 
 const STILL: &str = r#"

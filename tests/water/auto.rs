@@ -1,9 +1,10 @@
 //! What the fidelity `auto` chooses, and that it says so.
 
 use crate::support::says;
+use hydrograd::boundary::{Depth, Readout, RowScaling};
 use hydrograd::coupling::full::{FullSolver, Preconditioner};
-use hydrograd::scene::{Placement, Shape};
-use hydrograd::simulate::Method;
+use hydrograd::scene::{Placement, Preset, Shape};
+use hydrograd::simulate::{Exchange, Method};
 use hydrograd::{Body, Fidelity, Fluid, Scene, Settings, Simulator};
 
 fn balls(places: &[f64]) -> Scene {
@@ -80,7 +81,56 @@ fn settings_out_of_place_are_told() {
         .preconditioner(Preconditioner::Jacobi)
         .csd24_rho(2.0);
     assert!(warned(diagonal).contains("csd24_rho has no effect with the preconditioner jacobi"));
+    let unheeded = |settings: &Settings, names: &[&str], with: &str| {
+        let said = warned(settings.clone());
+        for name in names {
+            says(
+                &said,
+                &[&format!("setting {name} has no effect with {with}:")],
+            );
+        }
+        assert_eq!(said.lines().count(), names.len(), "{said}");
+    };
+    let tight = |settings: &Settings| {
+        let settings = settings.tolerance(1e-10).max_iterations(700);
+        settings.solver(FullSolver::Qr)
+    };
+    let solve = ["tolerance", "solver", "max_iterations"];
     let reduced = full.fidelity(Fidelity::Reduced);
+    unheeded(&tight(&reduced), &solve, "the fidelity reduced");
+    let alone = full.fidelity(Fidelity::Isolated);
+    unheeded(&tight(&alone), &solve, "the fidelity isolated");
+    assert_eq!(warned(tight(&full)), "");
+    let compressed = |settings: &Settings| settings.accuracy(0.02).exchange(Exchange::Factor);
+    let names = ["accuracy", "exchange"];
+    unheeded(&compressed(&full), &names, "the fidelity full");
+    unheeded(&compressed(&alone), &names, "the fidelity isolated");
+    for fidelity in [Fidelity::Reduced, Fidelity::Auto] {
+        assert_eq!(warned(compressed(&full.fidelity(fidelity))), "");
+    }
+    let sources = |settings: &Settings| {
+        let settings = settings.depth(Depth::Fixed(0.3)).readout(Readout::Centre);
+        settings.rows(RowScaling::Unscaled).damping(1e-3)
+    };
+    let names = ["depth", "rows", "readout", "damping"];
+    unheeded(&sources(&full), &names, "the method panel");
+    unheeded(&sources(&reduced), &names, "the method auto");
+    for of in [&full, &reduced] {
+        let said = warned(sources(&of.method(Method::MfsVertex)));
+        assert!(!said.contains("no effect"), "{said}");
+    }
+    // A preset's own numbers aren't asked for by name.
+    let paper = Settings {
+        preset: Some(Preset::Paper),
+        ..full.method(Method::Panel)
+    };
+    assert_eq!(warned(paper), "");
+    let folder = tempfile::tempdir().unwrap();
+    for (settings, told) in [(&full, true), (&alone, true), (&reduced, false)] {
+        let made = Simulator::cached(&scene, settings.clone(), folder.path()).unwrap();
+        let said = made.warnings().join("\n");
+        assert_eq!(said.contains("setting cache has no effect"), told, "{said}");
+    }
     assert!(warned(reduced.rank(2)).contains("compressed sources leave"));
     assert_eq!(warned(reduced.clone()), "");
     let refused = |settings: Settings| {

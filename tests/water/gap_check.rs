@@ -56,6 +56,12 @@ fn the_smallest_gap_is_checked_against_panels() {
             (check.slope[k] / difference - 1.0).abs() < 1e-4,
             "{fidelity:?}"
         );
+        if fidelity == Fidelity::Full {
+            // At a unit speed the force is half the slope; of M that goes as 1/h it would be M/2h.
+            let share = 0.5 * difference.abs() / (0.5 * mass(gap) / gap);
+            assert!((check.force_share() / share - 1.0).abs() < 1e-4);
+            assert!((0.1..1.0).contains(&share), "{share}");
+        }
     }
     assert!((0.01..0.1).contains(&check.added_mass_error()));
     assert!((0.1..0.6).contains(&check.force_error()));

@@ -55,22 +55,26 @@ struct Source {
 impl Source {
     /// What is asked about, as a scene; `density` replaces the water's.
     fn scene(&self, density: Option<f64>, robot: &RobotArguments) -> Result<Scene> {
-        let alone = |shape: Shape, name: &str| {
+        let alone = |shape: Shape, name: &str, place: String| {
+            let only = "only robots (.urdf, .mjcf, .xml) have them: leave them out";
+            robot.refuse(place, only)?;
             let mut scene = Scene::new(Fluid::fresh_water());
             let density = scene.fluid.density;
             scene.name = name.into();
             scene.add(Body::new(shape).named(name).density(density));
-            scene
+            Ok::<_, Error>(scene)
         };
         let mut scene = if let Some(shape) = &self.shape {
-            alone(shape.clone(), shape.kind())
+            alone(shape.clone(), shape.kind(), "--shape".into())?
         } else {
             // The command line asks for one of the two.
             let path = self.file.as_deref().unwrap_or(Path::new(""));
             let extension = path.extension().unwrap_or_default().to_string_lossy();
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
             match extension.to_ascii_lowercase().as_str() {
-                "obj" | "stl" | "ply" | "dae" => alone(Shape::mesh(path), &stem),
+                "obj" | "stl" | "ply" | "dae" => {
+                    alone(Shape::mesh(path), &stem, path.display().to_string())?
+                }
                 scene if scene == "toml" || is_urdf(path) => robot.scene(path)?,
                 _ => {
                     return Err(Error::input(

@@ -40,7 +40,7 @@ pub struct Options {
 ///
 /// # Errors
 /// Frames that select nothing ([`Frames::check`]) or follow each other faster than single precision tells apart; colours of bodies that there aren't, or that aren't "#rrggbb";
-/// positions beyond single precision; more than 4 GB; a folder or a file that can't be written, by its path.
+/// positions beyond single precision; more than 4 GB; a name that doesn't end in .glb, a folder or a file that can't be written, by its path.
 pub fn write(rollout: &Rollout, path: &Path, options: &Options) -> Result<()> {
     let states = options.frames.states(rollout)?;
     let names = rollout.simulator().names();
@@ -59,7 +59,7 @@ pub fn write(rollout: &Rollout, path: &Path, options: &Options) -> Result<()> {
 /// Makes the folder of a file and tries to write there, so that a long run isn't lost to a wrong path.
 ///
 /// # Errors
-/// A path without a name, that of a folder, and a folder that can't be made or written to.
+/// A path without a name, that of a folder, a name that doesn't end in .glb, and a folder that can't be made or written to.
 pub fn prepare(path: &Path) -> Result<()> {
     if path.file_name().is_none() || path.is_dir() {
         return Err(Error::File {
@@ -70,6 +70,14 @@ pub fn prepare(path: &Path) -> Result<()> {
                 "it must be a file, not a folder",
             ),
         });
+    }
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    if !extension.eq_ignore_ascii_case("glb") {
+        return Err(Error::input(
+            path.display().to_string(),
+            format!("extension {extension:?}"),
+            "animated scenes are written as .glb",
+        ));
     }
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => Recording::prepare(folder),

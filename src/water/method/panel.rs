@@ -240,25 +240,30 @@ impl BodyMethod for Panel {
             },
             ..asked
         };
-        let mut coupled = |meshes: Vec<Arc<PanelBoundary>>| -> Result<PanelCoupled> {
+        let coupled = |meshes: Vec<Arc<PanelBoundary>>| -> Result<PanelCoupled> {
             let excluded = problem.excluded.clone();
             let made = PanelCoupled::new(meshes, problem.walls, excluded, solve)?;
             let names = problem.bodies.iter().map(|b| b.name.to_string());
-            device.panels(made.named(names).with_added_mass(&own))
+            Ok(made.named(names).with_added_mass(&own))
         };
         let own_rates = shapes.own.clone();
-        let fine = coupled(made.iter().map(|m| m.fine.clone()).collect())?;
         // Bodies with different ratios: the largest takes least away.
         let ratios = made.iter().filter_map(|m| Some(m.known?.ratio));
         let ratio = ratios.fold(0.0, f64::max);
         let ratio_rates = shapes.ratio_rates(&made, ratio);
-        let panels = if ratio > 0.0 {
+        let coarse = || {
             let meshes = made.iter().map(|m| m.coarse.as_ref().unwrap_or(&m.fine));
-            let coarse = coupled(meshes.cloned().collect())?;
-            let both = ExtrapolatedPanels::new(fine, coarse, ratio)?;
-            Panels::Extrapolated(both.with_shapes(shapes.fine, shapes.coarse, ratio_rates)?)
-        } else {
-            Panels::Alone(fine.with_shapes(shapes.fine)?)
+            (ratio > 0.0)
+                .then(|| coupled(meshes.cloned().collect()))
+                .transpose()
+        };
+        let fine = coupled(made.iter().map(|m| m.fine.clone()).collect())?;
+        let panels = match device.panels(fine, coarse)? {
+            (fine, Some(coarse)) => {
+                let both = ExtrapolatedPanels::new(fine, coarse, ratio)?;
+                Panels::Extrapolated(both.with_shapes(shapes.fine, shapes.coarse, ratio_rates)?)
+            }
+            (fine, None) => Panels::Alone(fine.with_shapes(shapes.fine)?),
         };
         let (coupling, films): (Box<dyn Coupling>, _) = match problem.numerics.films {
             false => (panels.boxed(), Films::default()),

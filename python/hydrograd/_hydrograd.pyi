@@ -1288,7 +1288,7 @@ class Mpc:
         cost: Sequence[CostTerm] | None = None,
         progress: _Progress | None = None,
     ) -> MpcRun:
-        """Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far unless they are of a later time. Its cost is that of `cost`, or of the terms that are planned with.
+        """Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far if all of them are of times before, or it starts where the last run ended. Its cost is that of `cost`, or of the terms that are planned with.
         `progress(done, total)` is called every so often with the steps of the plant; what it raises ends the run, and so does Ctrl-C."""
 
 @final

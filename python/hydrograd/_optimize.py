@@ -179,7 +179,7 @@ class MpcRun:
     rollout: Rollout
     """Its trajectory; the controls are those that were applied."""
     rates: NDArray[np.float64]
-    """The running cost at each of its states but the last, (steps,), 1/s."""
+    """The running cost at each of its states but the last, (steps,), 1/s; changes of controls are those since a knot's time before."""
     cost: float
     """Their integral over time, with the last terms at the end."""
     replans: list[Replan]

@@ -459,7 +459,7 @@ impl Mpc {
         array::to_python(py, made.as_slice().to_vec(), &[made.len()])
     }
 
-    /// Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far unless they are of a later time. Its cost is that of `cost`, or of the terms that are planned with.
+    /// Runs a simulated plant for `steps` of its time steps from `state`, or from where it starts: an `MpcRun`; on from the plans so far if all of them are of times before, or it starts where the last run ended. Its cost is that of `cost`, or of the terms that are planned with.
     /// `progress(done, total)` is called every so often with the steps of the plant; what it raises ends the run, and so does Ctrl-C.
     #[pyo3(signature = (plant, steps, *, state=None, cost=None, progress=None))]
     fn run<'py>(

@@ -36,11 +36,3 @@ pub(super) fn has_faces(scene: &Scene, number: usize) -> bool {
         .map(|s| s.asked_faces().unwrap_or(DEFAULT_FACES))
         .all(|n| n == number)
 }
-
-/// Whether a shape by formula has sharp edges.
-pub(super) fn has_edges(shape: &Shape) -> bool {
-    matches!(
-        shape,
-        Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Prism { .. }
-    )
-}

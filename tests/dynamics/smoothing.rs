@@ -390,6 +390,18 @@ fn tasks_that_do_not_fit_are_refused() {
         rollout.value(&cost).unwrap_err(),
         &["1 bodies and 0 controls", "made for"],
     );
+    // Nothing of a run that ends before counts, nor of a span without times.
+    let short = Controls::zeros(&simulator, 20);
+    let short = simulator.rollout(&short).unwrap();
+    for (span, words) in [
+        ([0.5, 0.9], ["0.5 to 0.9 s", "from 0 to 0.2 s"]),
+        ([0.15, 0.1], ["0.15 to 0.1 s", "hold states"]),
+        ([f64::NAN, 0.1], ["NaN to 0.1 s", "hold states"]),
+    ] {
+        let cost = task.approach_cost(&simulator, span).unwrap();
+        says(short.value(&cost).unwrap_err(), &words);
+        says(short.gradient(&cost).unwrap_err(), &words);
+    }
     let mut softer = simulator.clone();
     says(
         softer.soften_contact(0.0).unwrap_err(),

@@ -28,7 +28,7 @@ const NEAR: f64 = 0.25;
 /// Farther than bodies of a scene are apart, m.
 const FAR: f64 = 1e6;
 
-/// The cost of a span of time: an [`Objective`] ([`super::GraspTask::hold_cost`], [`super::GraspTask::approach_cost`]).
+/// The cost of a span of time: an [`Objective`] ([`super::GraspTask::hold_cost`], [`super::GraspTask::approach_cost`]). A rollout none of whose states lies in it is refused.
 #[derive(Clone, Debug)]
 pub struct GraspCost {
     pub(super) grip: Arc<Grip>,
@@ -237,6 +237,15 @@ impl Objective for GraspCost {
                 "cost of a grasp",
                 format!("a rollout of {bodies} bodies and {controls} controls"),
                 "must be one of the scene that the cost was made for",
+            ));
+        }
+        if self.states(rollout).0.is_empty() {
+            let samples = rollout.samples();
+            let [from, to] = [0, samples.len() - 1].map(|n| samples[n].time);
+            return Err(Error::input(
+                "cost of a grasp: span",
+                format!("{} to {} s", self.span[0], self.span[1]),
+                format!("must hold states of the rollout, which goes from {from} to {to} s"),
             ));
         }
         rollout.observe("velocities").map(|_| ())

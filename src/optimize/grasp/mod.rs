@@ -236,7 +236,8 @@ impl<'a> Attempt<'a> {
         let touch = self.grip.first_touch(&rollout)?;
         let touch = touch.unwrap_or(0.6 * self.grip.duration);
         let steps = (APPROACH[1] * touch / self.simulator.time_step()) as usize;
-        if steps < 2 {
+        // Nor where no state lies in so short a time.
+        if steps < 2 || steps as f64 * self.simulator.time_step() < APPROACH[0] * touch {
             return Ok(x.to_vec());
         }
         let goal = GraspCost {

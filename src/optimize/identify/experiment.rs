@@ -1,12 +1,13 @@
 //! One recording, and what is simulated in its place.
 
+use super::derived::Derived;
 use crate::simulate::observable::{differentiable, observable};
 use crate::simulate::{Controls, Rollout, Simulator};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// One entry of an observable as it was seen at some states of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,57 +22,6 @@ pub struct Recorded {
     pub values: Vec<f64>,
     /// Standard deviation of the noise.
     pub deviation: f64,
-}
-
-/// Residuals as a function of observables, entries × states each: differences over deviations.
-type Function = dyn Fn(&[DMatrix<f64>]) -> Result<DVector<f64>> + Send + Sync;
-
-/// Residuals that aren't entries of observables themselves.
-#[derive(Clone)]
-pub(super) struct Derived {
-    pub observables: Vec<String>,
-    pub states: Vec<usize>,
-    pub function: Arc<Function>,
-    /// Number of residuals, once it is known.
-    count: Arc<OnceLock<usize>>,
-}
-
-impl Derived {
-    /// What the function sees of a rollout.
-    pub fn seen(&self, rollout: &Rollout) -> Result<Vec<DMatrix<f64>>> {
-        let each = self.observables.iter();
-        each.map(|name| Ok(rollout.observe(name)?.select_columns(&self.states)))
-            .collect()
-    }
-
-    /// Number of residuals, once they have been asked for.
-    pub fn residuals(&self) -> usize {
-        self.count.get().copied().unwrap_or(0)
-    }
-
-    /// Residuals.
-    pub fn value(&self, seen: &[DMatrix<f64>]) -> Result<DVector<f64>> {
-        let found = (self.function)(seen)?;
-        let count = *self.count.get_or_init(|| found.len());
-        if found.len() != count || count == 0 {
-            return Err(Error::input(
-                format!("function of {:?}", self.observables),
-                format!("{} residuals", found.len()),
-                match count {
-                    0 => "must give at least one".to_string(),
-                    count => format!("must give as many as before, {count}"),
-                },
-            ));
-        }
-        match found.iter().position(|x| !x.is_finite()) {
-            None => Ok(found),
-            Some(i) => Err(Error::input(
-                format!("residual {i} of a function of {:?}", self.observables),
-                found[i],
-                "must be finite",
-            )),
-        }
-    }
 }
 
 /// A recording: what was done, and what was seen.
@@ -116,12 +66,9 @@ impl Experiment {
         states: Vec<usize>,
         function: impl Fn(&[DMatrix<f64>]) -> Result<DVector<f64>> + Send + Sync + 'static,
     ) -> Self {
-        self.derived.push(Derived {
-            observables: observables.iter().map(|name| (*name).to_string()).collect(),
-            states,
-            function: Arc::new(function),
-            count: Arc::default(),
-        });
+        let names = observables.iter().map(|name| (*name).to_string());
+        let of = Derived::new(names.collect(), states, Arc::new(function));
+        self.derived.push(of);
         self
     }
 

@@ -1,6 +1,6 @@
 //! The misfit of all experiments, with its residuals and their Jacobian.
 
-use super::experiment::Derived;
+use super::derived::derivative;
 use super::root;
 use super::unknown::{Prior, Searched, Target};
 use super::{Experiment, Loss, Unknown};
@@ -523,24 +523,6 @@ fn settings_of(unknowns: &[Searched], experiment: &Experiment) -> Result<Vec<Set
         }
     }
     Ok(out)
-}
-
-/// Size of the differences by which functions of observables are differentiated, relative: their error is its square.
-const DIFFERENCE: f64 = 1e-5;
-
-/// Derivative of residuals along tangents of what they are a function of.
-fn derivative(of: &Derived, seen: &[DMatrix<f64>], along: &[DMatrix<f64>]) -> Result<DVector<f64>> {
-    let size = |all: &[DMatrix<f64>]| all.iter().map(DMatrix::amax).fold(0.0, f64::max);
-    let (at, tangent) = (size(seen), size(along));
-    if tangent == 0.0 {
-        return Ok(DVector::zeros(of.residuals()));
-    }
-    let h = DIFFERENCE * at.max(1e-3) / tangent;
-    let moved = |h: f64| {
-        let each: Vec<_> = seen.iter().zip(along).map(|(x, d)| x + h * d).collect();
-        of.value(&each)
-    };
-    Ok((moved(h)? - moved(-h)?) / (2.0 * h))
 }
 
 /// Generalised velocities that nothing drives.

@@ -15,6 +15,7 @@
 //! D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963; J. Moré, "The Levenberg–Marquardt algorithm: implementation and theory", 1978;
 //! H. B. Nielsen, "Damping parameter in Marquardt's method", IMM-REP-1999-05; P. J. Huber, *Robust Statistics*, 1981.
 
+mod derived;
 mod experiment;
 mod marquardt;
 mod misfit;

@@ -10,7 +10,7 @@ pub use run::{MpcProgress, MpcRun};
 
 use super::cost::Sizes;
 use super::ilqr::{self, Guess, IlqrProgress, IlqrSettings, IlqrStop, Plan, Problem, Ready};
-use crate::simulate::{Simulator, steps_at};
+use crate::simulate::{Simulator, State, steps_at};
 use crate::{Error, Result};
 use nalgebra::DVector;
 use serde::Serialize;
@@ -78,6 +78,8 @@ pub struct Mpc {
     previous: Option<DVector<f64>>,
     /// Time of the first call, s.
     start: f64,
+    /// Where the last run ended, and its plant's time step, s.
+    ended: Option<(State, f64)>,
 }
 
 /// That the plant's states and controls are those of the model.
@@ -132,12 +134,13 @@ impl Mpc {
             held: None,
             replans: Vec::new(),
             start: 0.0,
+            ended: None,
         })
     }
 
     /// Forgets plans, so that the next call starts anew.
     pub fn reset(&mut self) {
-        (self.plan, self.held) = (None, None);
+        (self.plan, self.held, self.ended) = (None, None, None);
         self.ready.previous = self.previous.clone();
         self.replans.clear();
     }

@@ -2,7 +2,7 @@
 
 use super::{Mpc, Replan, check_plant};
 use crate::optimize::cost::{Cost, CostPoint, Sizes};
-use crate::simulate::{Rollout, Simulator, State};
+use crate::simulate::{Rollout, Simulator, State, steps_at};
 use crate::{Error, Result};
 use std::ops::ControlFlow;
 
@@ -23,7 +23,7 @@ pub struct MpcProgress {
 pub struct MpcRun {
     /// Its trajectory; the controls are those that were applied.
     pub rollout: Rollout,
-    /// The running cost at each of its states but the last, as a rate (1/s).
+    /// The running cost at each of its states but the last, as a rate (1/s); changes of controls are those since a knot's time before.
     pub rates: Vec<f64>,
     /// Their integral over time, with the last terms at the end.
     pub cost: f64,
@@ -42,7 +42,7 @@ impl MpcRun {
 }
 
 impl Mpc {
-    /// Runs a plant for so many of its time steps, from a state of it; on from the plans so far unless they are of a later time. Its cost is that of `cost`, read on the plant: as a rule the problem's.
+    /// Runs a plant for so many of its time steps, from a state of it; on from the plans so far if all of them are of times before, or it starts where the last run ended. Its cost is that of `cost`, read on the plant: as a rule the problem's.
     /// `progress` is called before every step and may end the run.
     ///
     /// # Errors
@@ -59,13 +59,16 @@ impl Mpc {
         check_plant(Sizes::of(plant), self.ready.cost.sizes)?;
         let bound = cost.bind(plant)?;
         let time = start.step as f64 * plant.time_step();
-        if self
-            .held
-            .as_ref()
-            .is_some_and(|(step, _)| self.time_of(*step) > time)
-        {
+        let goes_on = self.ended.take() == Some((start.clone(), plant.time_step()));
+        let decided = self.held.as_ref().map(|(step, _)| *step);
+        let decided = decided.max(self.plan.as_ref().map(|(step, _)| *step));
+        let now = steps_at(time - self.start, self.model.time_step());
+        // What was decided at that time was for another state.
+        if !goes_on && decided.is_some_and(|step| now <= step as f64) {
             self.reset();
         }
+        let held = self.held.as_ref().map(|(_, control)| control.clone());
+        let first = held.or_else(|| self.previous.clone());
         let before = self.replans.len();
         let rollout = plant.rollout_deciding(start, steps, |n, sample| {
             let told = MpcProgress {
@@ -87,16 +90,22 @@ impl Mpc {
             .map(|c| c.into_owned())
             .collect();
         let dt = plant.time_step();
+        // Controls change from knot to knot of a plan, which may last many steps of the plant.
+        let knot = (steps_at(self.ready.duration, dt) as usize).max(1);
         let at = |n: usize| CostPoint {
             rollout: &rollout,
             state: n,
             knot: n,
             control: columns.get(n),
-            previous: n.checked_sub(1).and_then(|n| columns.get(n)),
+            previous: match n.checked_sub(knot) {
+                Some(before) => columns.get(before),
+                None => first.as_ref(),
+            },
         };
         let rates = (0..steps).map(|n| bound.value(&at(n), 1.0));
         let rates = rates.collect::<Result<Vec<f64>>>()?;
         let last = bound.value(&at(steps), 1.0)?;
+        self.ended = rollout.states().last().map(|end| (end.clone(), dt));
         Ok(MpcRun {
             cost: dt * rates.iter().sum::<f64>() + last,
             rates,

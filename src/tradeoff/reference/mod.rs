@@ -28,10 +28,20 @@ const NEGLIGIBLE: f64 = 1e-9;
 pub(super) struct Limits {
     /// s
     pub seconds: f64,
-    /// Finest faces per body; then time doesn't limit the resolutions.
+    /// Finest faces per body; then time doesn't limit resolutions and accuracies.
     pub faces: Option<usize>,
     /// Steps of the scene's own length over which trajectories are compared.
     pub steps: usize,
+}
+
+/// So much later than now nothing ends for want of time.
+const NEVER: Duration = Duration::from_secs(1 << 30);
+
+impl Limits {
+    /// When what may take a time from now must end: never where it is to be of given faces.
+    fn until(&self, time: Duration) -> Instant {
+        Instant::now() + if self.faces.is_some() { NEVER } else { time }
+    }
 }
 
 /// Runs levels one after another while the next, expected to take `growth` times as long, ends in time;
@@ -89,9 +99,9 @@ impl Reference {
     pub fn new(scene: &Scene, limits: Limits, watch: &mut Watch) -> Result<Self> {
         let begin = Instant::now();
         let half = Duration::from_secs_f64(limits.seconds / 2.0);
-        let panels = Panels::new(scene, &limits, begin + half, watch);
+        let panels = Panels::new(scene, &limits, limits.until(half), watch);
         watch.check()?;
-        let simulations = Simulations::new(scene, &limits, half, watch);
+        let simulations = Simulations::new(scene, &limits, limits.until(half), watch);
         watch.check()?;
         let mut notes = Vec::new();
         let (panels, simulations) = match (panels, simulations) {

@@ -10,7 +10,7 @@ use crate::tradeoff::progress::Watch;
 use crate::tradeoff::shapes::{ClosedForms, closed_forms, refinable, shapes};
 use crate::tradeoff::start::{Path, Start};
 use crate::{Error, Result};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Accuracy of the compression, and steps for each of the scene's.
 const LEVELS: [(f64, usize); 4] = [(1e-2, 1), (1e-3, 2), (1e-4, 2), (1e-5, 4)];
@@ -18,7 +18,7 @@ const LEVELS: [(f64, usize); 4] = [(1e-2, 1), (1e-3, 2), (1e-4, 2), (1e-5, 4)];
 const FULL_LEVELS: [(f64, usize); 3] = [(0.0, 1), (0.0, 2), (0.0, 4)];
 /// How the time grows with each of them.
 const GROWTH: f64 = 3.0;
-/// Faces per body at these levels, then at the last of them on finer meshes.
+/// Faces per body at these levels, then at the last of them on finer meshes; unless they are given.
 const FACES: [usize; 4] = [500, 980, 2000, 3920];
 /// How the time grows with each of them: the larger part is often that of the steps, which are the same.
 const MESH_GROWTH: f64 = 4.0;
@@ -70,9 +70,8 @@ pub(super) struct Simulations {
 }
 
 impl Simulations {
-    /// By the first way that works, in about `time`.
-    pub fn new(scene: &Scene, limits: &Limits, time: Duration, watch: &mut Watch) -> Result<Self> {
-        let until = Instant::now() + time;
+    /// By the first way that works, until about then.
+    pub fn new(scene: &Scene, limits: &Limits, until: Instant, watch: &mut Watch) -> Result<Self> {
         let mut why = None;
         for method in [Method::Auto, Method::Panel] {
             match Self::by(scene, Way::Reduced(method), limits, until, watch) {
@@ -113,11 +112,12 @@ impl Simulations {
             Way::Reduced(_) => LEVELS.as_slice(),
             Way::Full => FULL_LEVELS.as_slice(),
         };
+        let meshes = meshes(limits.faces);
         let level = |(accuracy, parts): (f64, usize), gap| Level {
             way,
             accuracy,
             parts,
-            faces: FACES[0],
+            faces: meshes[0],
             gap,
         };
         let mut rough = run(level(levels[0], None))?;
@@ -139,7 +139,7 @@ impl Simulations {
             best,
         };
         if out.best.level.meshed(scene) {
-            out.refine(limits, until, run)?;
+            out.refine(&meshes[1..], until, run)?;
         }
         Ok(Some(out))
     }
@@ -147,13 +147,11 @@ impl Simulations {
     /// On finer meshes.
     fn refine(
         &mut self,
-        limits: &Limits,
+        finer: &[usize],
         until: Instant,
         mut run: impl FnMut(Level) -> Result<Simulation>,
     ) -> Result<()> {
-        let most = limits.faces.unwrap_or(usize::MAX).max(FACES[1]);
-        let finer = FACES[1..].iter().filter(|n| **n <= most);
-        let levels = finer.map(|faces| Level {
+        let levels = finer.iter().map(|faces| Level {
             faces: *faces,
             ..self.best.level
         });
@@ -176,6 +174,17 @@ impl Simulations {
             .sum::<Option<f64>>()
             .filter(|_| !self.pairs.is_empty())
     }
+}
+
+/// Faces per body, one after another, up to what is given.
+fn meshes(faces: Option<usize>) -> Vec<usize> {
+    let Some(finest) = faces else {
+        return FACES.to_vec();
+    };
+    let half = finest.div_ceil(2);
+    let mut out = vec![FACES[0].min(half), half, finest];
+    out.dedup();
+    out
 }
 
 impl Level {
@@ -254,4 +263,44 @@ fn gaps(simulator: &Simulator, path: &Path) -> Vec<(f64, f64)> {
         Some((nearest(b), d.resolved_gap?))
     });
     compressed.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Body, Fluid, Shape};
+    use std::ops::ControlFlow;
+
+    /// With faces given all levels are run, on no more faces than that.
+    #[test]
+    fn given_faces_go_by_no_clock() {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.gravity = [0.0, 0.0, -9.81];
+        scene.add(Body::new(Shape::cuboid([0.1, 0.08, 0.06])).density(2000.0));
+        let made = |faces| {
+            let limits = Limits {
+                seconds: 1e-3,
+                faces,
+                steps: 1,
+            };
+            let mut on = |_| ControlFlow::Continue(());
+            let until = limits.until(std::time::Duration::ZERO);
+            Simulations::new(&scene, &limits, until, &mut Watch::new(&mut on)).unwrap()
+        };
+        let given = made(Some(96));
+        let level = given.best.level;
+        assert_eq!((level.accuracy, level.parts), LEVELS[LEVELS.len() - 1]);
+        assert_eq!((level.faces, given.pairs.len()), (96, 2));
+        assert!(given.best.faces <= 110, "{}", given.best.faces);
+        let timed = made(None).best.level;
+        assert_eq!((timed.accuracy, timed.parts), LEVELS[1]);
+        for (faces, expected) in [
+            (None, &FACES[..]),
+            (Some(2000), &[500, 1000, 2000]),
+            (Some(600), &[300, 600]),
+            (Some(1), &[1]),
+        ] {
+            assert_eq!(meshes(faces), expected);
+        }
+    }
 }

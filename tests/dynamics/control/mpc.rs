@@ -217,3 +217,114 @@ fn motions_go_by_the_models_clock() {
     assert!(failures.is_empty(), "{failures:?}");
     assert_eq!(run.replans.len(), 12);
 }
+
+/// A dry cart on a rail.
+fn cart(time_step: f64) -> Simulator {
+    let mut scene = Scene::new(Fluid::none());
+    scene.time_step = time_step;
+    let axis = [1.0, 0.0, 0.0];
+    let cart = Body::dry().mass(2.0).inertia([0.1; 3]);
+    scene.add(cart.joint(Joint::Prismatic { axis }).actuated());
+    Simulator::new(&scene, Settings::default()).unwrap()
+}
+
+/// A cart is stopped with smooth controls.
+fn stop() -> Cost {
+    Cost::default()
+        .running(terms::velocity([0.0], 5.0))
+        .running(terms::effort(1e-2))
+        .running(terms::control_change(2e-2))
+}
+
+/// A run from another state at the time of the last one's decision has controls of its own; one that goes on within a step of the model keeps those that are held.
+#[test]
+fn runs_answer_to_where_they_start() {
+    let go = |_: &_| ControlFlow::Continue(());
+    let problem = Problem::new(10, stop());
+    let (model, finer) = (cart(0.1), cart(0.05));
+    let at = |v: f64| {
+        let (q, v) = (DVector::zeros(1), DVector::from_element(1, v));
+        model.state(0, &q, &v).unwrap()
+    };
+    for feedback in [true, false] {
+        let settings = MpcSettings {
+            every: 5,
+            feedback,
+            ..MpcSettings::default()
+        };
+        let new = || Mpc::new(&model, &problem, settings).unwrap();
+        let mut mpc = new();
+        let one = |mpc: &mut Mpc, v: f64| {
+            let run = mpc.run(&model, &at(v), 1, &problem.cost, go).unwrap();
+            run.rollout.controls()[(0, 0)]
+        };
+        let (there, back) = (one(&mut mpc, 1.0), one(&mut mpc, -1.0));
+        assert!(
+            there < -1.0 && (there + back).abs() < 1e-6,
+            "{there} {back}"
+        );
+        assert_eq!(back, one(&mut new(), -1.0));
+        // What was asked for by itself is no run's either.
+        let mut asked = new();
+        asked
+            .control(0.0, &at(1.0).q, &DVector::from_element(1, 1.0))
+            .unwrap();
+        assert_eq!(back, one(&mut asked, -1.0));
+
+        let start = finer.state(0, &DVector::zeros(1), &DVector::from_element(1, 1.0));
+        let start = start.unwrap();
+        let whole = new().run(&finer, &start, 6, &problem.cost, go).unwrap();
+        let mut mpc = new();
+        let first = mpc.run(&finer, &start, 3, &problem.cost, go).unwrap();
+        let middle = &first.rollout.states()[3];
+        let second = mpc.run(&finer, middle, 3, &problem.cost, go).unwrap();
+        let parts = [first, second].map(|run| run.rollout.controls().clone());
+        for (n, all) in whole.rollout.controls().iter().enumerate() {
+            assert_eq!(*all, parts[n / 3][(0, n % 3)], "step {n}");
+        }
+        assert_eq!(mpc.replans().len(), 1);
+    }
+}
+
+/// Changes of controls cost a run what they cost its plan: a whole knot each, the first one's from the controls before.
+#[test]
+fn a_run_costs_what_its_plan_does() {
+    let go = |_: &_| ControlFlow::Continue(());
+    let settings = MpcSettings {
+        every: 12,
+        feedback: false,
+        ..MpcSettings::default()
+    };
+    let model = cart(0.1);
+    let start = |of: &Simulator| {
+        let v = DVector::from_element(1, 1.0);
+        of.state(0, &DVector::zeros(1), &v).unwrap()
+    };
+    let controls = Cost::default()
+        .running(terms::effort(1e-2))
+        .running(terms::control([-3.0], 0.1))
+        .running(terms::control_change(2e-2));
+    // States between knots count in a run only: with more than a step a knot, controls alone.
+    for (hold, steps, cost) in [
+        (1, 1, stop().last(terms::velocity([0.0], 10.0))),
+        (4, 1, controls.clone()),
+        (4, 2, controls),
+    ] {
+        let mut problem = Problem::new(12 / hold, cost).hold(hold);
+        for previous in [None, Some(vec![20.0])] {
+            problem.previous = previous;
+            let mut mpc = Mpc::new(&model, &problem, settings).unwrap();
+            let plant = cart(0.1 / f64::from(steps));
+            let count = 12 * steps as usize;
+            let run = mpc.run(&plant, &start(&plant), count, &problem.cost, go);
+            let run = run.unwrap();
+            let planned = mpc.plan().unwrap().cost();
+            assert!(
+                (run.cost / planned - 1.0).abs() < 1e-9,
+                "{} {planned}: {hold} steps a knot, {steps} of the plant",
+                run.cost
+            );
+            assert_eq!(run.replans.len(), 1);
+        }
+    }
+}

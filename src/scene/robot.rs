@@ -47,6 +47,9 @@ pub struct RobotLink {
     /// Its own added mass at unit density about the link's origin, 6 × 6.
     #[serde(skip_serializing_if = "is_default")]
     pub added_mass: Option<Vec<Vec<f64>>>,
+    /// Whether it may lie in what carries it, also where it doesn't at the start: the two don't feel each other through the water.
+    #[serde(skip_serializing_if = "is_default")]
+    pub overlaps_parent: bool,
 }
 
 impl RobotLink {
@@ -59,6 +62,7 @@ impl RobotLink {
             ("volume", self.volume.is_some()),
             ("center_of_buoyancy", self.center_of_buoyancy.is_some()),
             ("added_mass", self.added_mass.is_some()),
+            ("overlaps_parent", self.overlaps_parent),
         ];
         let given = keys.into_iter().filter(|(_, given)| *given);
         given.map(|(key, _)| key).collect()
@@ -68,6 +72,7 @@ impl RobotLink {
     fn apply(&self, body: &mut Body) {
         body.center_of_mass = self.center_of_mass.or(body.center_of_mass);
         body.volume = self.volume.or(body.volume);
+        body.overlaps_parent |= self.overlaps_parent;
         body.center_of_buoyancy = self.center_of_buoyancy.or(body.center_of_buoyancy);
         if self.inertia.is_some() {
             body.inertia.clone_from(&self.inertia);

@@ -184,8 +184,7 @@ pub(crate) fn assemble(
     };
     let lubricated = lubrication::lubricated(scene, &surfaces, &clearance)?;
     shape::refuse(scene, &changes, &lubricated, !streams.is_empty())?;
-    let floating = scene.waterline.is_some();
-    let changed = shape::changed_surfaces(scene, &changes, &shapes, &surfaces, floating);
+    let changed = shape::changed_surfaces(&changes, &shapes, &surfaces);
     let parts = force::ForceParts {
         scene,
         time_step: dt,
@@ -197,6 +196,7 @@ pub(crate) fn assemble(
         waterline: scene.waterline.map(|_| streams.surface()),
         lubricated,
         changed: &changed,
+        shapes: &shapes,
         streams: streams.clone(),
         added_mass,
     };

@@ -8,7 +8,7 @@ use crate::dynamics::{
     BodyValues, ChangedShape, Declarations, Declared, Follows, Owner, Parameter, Range, Shapes,
     body_places,
 };
-use crate::scene::{Drag, Scene};
+use crate::scene::Scene;
 use crate::water::{ShapeChange, Surface, pose};
 use crate::{Error, Result};
 use std::path::Path;
@@ -71,29 +71,20 @@ pub(super) fn declare(
 /// Part of a length by which surfaces are changed where forces take differences: these err by its square, and by rounding over it.
 const STEP: f64 = 1e-5;
 
-/// Surfaces changed by the parameters `shapes`, for forces that follow from them; `floating` where water has a surface.
-pub(super) fn changed_surfaces(
-    scene: &Scene,
-    changes: &[ShapeChange],
+/// Surfaces changed by the parameters `shapes`, for forces that follow from them.
+pub(super) fn changed_surfaces<'a>(
+    changes: &'a [ShapeChange],
     shapes: &Shapes,
-    surfaces: &[Option<Surface>],
-    floating: bool,
-) -> Vec<ChangedSurface> {
-    let changed = |(change, parameter): (&ShapeChange, &Parameter)| {
+    surfaces: &'a [Option<Surface>],
+) -> Vec<ChangedSurface<'a>> {
+    let changed = |(change, parameter): (&'a ShapeChange, &Parameter)| {
         let mesh = &surfaces[change.body].as_ref()?.mesh;
-        // Each holds the whole surface twice: only where a force follows from it.
-        let drags = |d: Drag| d.linear != 0.0 || d.quadratic != 0.0;
-        if !floating && !scene.bodies[change.body].drag.is_some_and(drags) {
-            return None;
-        }
-        let step = STEP * change.size;
-        let moved = [step, -step].map(|t| change.moved(mesh, t));
         Some(ChangedSurface {
             body: change.body,
             parameter: *parameter,
-            step,
-            surfaces: moved.each_ref().map(elements),
-            hulls: floating.then(|| moved.each_ref().map(hull)),
+            step: STEP * change.size,
+            surface: Box::new(move |t| elements(&change.moved(mesh, t))),
+            hull: Box::new(move |t| hull(&change.moved(mesh, t))),
         })
     };
     changes

@@ -5,7 +5,7 @@
 //! table; packing, names, checks and gradient checks read the table.
 
 use super::body_parameters::{
-    BUOYANCY, CENTER, CONTACT, FLUID, INERTIA, MASS, NO_VOLUME, VOLUME, contact, inertia,
+    BUOYANCY, CENTER, CONTACT, FLUID, INERTIA, MASS, NO_VOLUME, VOLUME, contact,
 };
 use crate::adjoint::lie::Vec3;
 use crate::scene::impossible_inertia;
@@ -15,7 +15,7 @@ use std::ops::{Index, IndexMut};
 use std::sync::Arc;
 
 pub use super::body_parameters::{
-    BodyValues, DENSITY, center_of_buoyancy, center_of_mass, mass, volume,
+    BodyValues, DENSITY, center_of_buoyancy, center_of_mass, inertia, mass, volume,
 };
 pub use super::declared::{Declared, Entry, Owner, Parameter, Range, Typical};
 

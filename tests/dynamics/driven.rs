@@ -1,10 +1,11 @@
 //! Joints that a motion drives: nobody else says where they are, and no gradient goes there.
 
-use crate::support::says;
+use crate::support::{INTEGRATORS, check_gradient, run, says};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Controller, Fluid, Joint, Motion, Scene, Shape};
 use hydrograd::{Controls, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::FRAC_PI_2;
 
 const PHASE: f64 = 0.4;
 
@@ -89,6 +90,43 @@ fn no_gradient_goes_to_where_a_driven_joint_starts() {
         assert_eq!(state.column(2).amax(), 0.0);
         assert!(state.column(1).amax() > 0.5);
     }
+}
+
+/// A cart recoils from what a motion does on it: momentum is kept, whatever the integrator.
+#[test]
+fn a_driven_joint_pushes_with_all_of_its_acceleration() {
+    let mut scene = Scene::new(Fluid::none());
+    let axis = [1.0, 0.0, 0.0];
+    let body = |name: &str| Body::dry().named(name).mass(1.0).inertia([0.1; 3]);
+    scene.add(body("cart").joint(Joint::Prismatic { axis }));
+    let swing = Motion::Sine {
+        offset: 0.0,
+        amplitude: 0.1,
+        frequency: 10.0,
+        phase: FRAC_PI_2,
+    };
+    let slider = body("slider").child_of("cart");
+    scene.add(slider.joint(Joint::Prismatic { axis }).driven([swing]));
+    for (integrator, time_step) in INTEGRATORS
+        .into_iter()
+        .zip([1e-3, 2e-3].into_iter().cycle())
+    {
+        scene.time_step = time_step;
+        let settings = Settings::default().integrator(integrator);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let rollout = run(&simulator, 100);
+        for s in rollout.samples() {
+            let exact = 0.5 * (10.0 * s.time).sin();
+            assert!(
+                (s.v[0] - exact).abs() < 1e-12,
+                "{integrator:?} at {} s: {} is not {exact}",
+                s.time,
+                s.v[0]
+            );
+        }
+    }
+    let mut simulator = swinging(Integrator::VelocityEuler);
+    check_gradient("a slider on a rail", &mut simulator, 20, 2, 1e-6);
 }
 
 /// A joint that is locked has no motion: what is wrong with a velocity there is told as that.

@@ -3,7 +3,7 @@
 use crate::support::INTEGRATORS;
 use crate::support::forward::{self, check_forward};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, BodyId, Contact, Drag, DragPart, Fluid, Joint, Scene};
+use hydrograd::scene::{Body, BodyId, Contact, Drag, DragPart, Fluid, Joint, Scene, Thruster};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Shape, Simulator, objective};
 
 const STEPS: usize = 8;
@@ -224,6 +224,72 @@ fn drag_and_buoyancy_follow_shapes() {
         );
         println!("{}: {off:.1e}", shape.kind());
         assert!(off < 1e-6, "{}: {off:e}", shape.kind());
+    }
+}
+
+/// Drag that the scene doesn't give, or gives as nothing, may be set: shapes have their part in it all the same.
+#[test]
+fn drag_that_is_set_later_follows_shapes() {
+    let set = [
+        (None, [("linear", 60.0)].as_slice()),
+        (
+            Some(Drag::default()),
+            &[("linear", 30.0), ("quadratic", 0.4)],
+        ),
+    ];
+    for (given, values) in set {
+        let mut scene = scene(&[Shape::cuboid([0.4, 0.7, 0.2])]);
+        scene.bodies[0].drag = given;
+        let goal = objective::final_position(BodyId(0), [0.3, 0.1, -0.2]);
+        let dragged = |scene: &Scene, shapes: Option<Vec<String>>| {
+            let settings = Settings {
+                shape_parameters: shapes,
+                ..settings(Fidelity::Isolated, Integrator::MomentumEuler)
+            };
+            let mut simulator = Simulator::new(scene, settings).unwrap();
+            let mut parameters = simulator.parameters().clone();
+            for (name, value) in values {
+                let name = format!("body0.drag.{name}");
+                parameters.set(&name, *value).unwrap();
+            }
+            simulator.set_parameters(parameters).unwrap();
+            simulator
+        };
+        let simulator = dragged(&scene, Some(vec!["body0.size".into()]));
+        let gradient = run(&simulator).gradient(&goal).unwrap();
+        for name in ["body0.size.x", "body0.size.y", "body0.size.z"] {
+            let at = simulator.parameters().get(name).unwrap();
+            let along = |h: f64| {
+                let changed = scene.with_shape_parameter(name, at + h).unwrap();
+                run(&dragged(&changed, None)).value(&goal).unwrap()
+            };
+            let h = 1e-3 * at;
+            let central = |h: f64| (along(h) - along(-h)) / (2.0 * h);
+            let differences = (4.0 * central(0.5 * h) - central(h)) / 3.0;
+            let adjoint = gradient.parameters.get(name).unwrap();
+            let error = (adjoint / differences - 1.0).abs();
+            assert!(error < 1e-5, "{name}: {adjoint} is not {differences}");
+        }
+    }
+}
+
+/// A thruster's rotor is driven by its inertia, which follows from its shape, in the water and out of it.
+#[test]
+fn a_rotor_follows_its_shape() {
+    for dry in [false, true] {
+        let mut scene = scene(&[
+            Shape::ellipsoid([0.5, 0.3, 0.35]),
+            Shape::cylinder(0.2, 0.1),
+        ]);
+        if dry {
+            scene.fluid = Fluid::none();
+        }
+        let thruster = Thruster::new("body0").polynomial([0.1]);
+        scene.add_force(thruster.rotor("body1", 0.3).into());
+        let settings = settings(Fidelity::Isolated, Integrator::Rk4);
+        let off = worst(&scene, &settings, 1e-3);
+        println!("dry {dry}: {off:.1e}");
+        assert!(off < 1e-6, "dry {dry}: {off:e}");
     }
 }
 

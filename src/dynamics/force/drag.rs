@@ -2,8 +2,7 @@
 //! −½ ρ c Σ ΔA |w| w.
 
 use super::{
-    ChangedSurface, ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity,
-    Waterline,
+    ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity, Waterline,
 };
 use crate::adjoint::drag::{
     Element, Part, Surface, quadratic_drag, quadratic_drag_derivative, resistance,
@@ -36,6 +35,7 @@ struct Dragged {
     kind: Kind,
     /// Of the whole surface.
     law: Law,
+    /// Its pieces, where water has a surface that may cut it.
     surface: Vec<Element>,
     /// With shape parameters a little larger and smaller by the step.
     changed: Vec<(Parameter, f64, [Box<Dragged>; 2])>,
@@ -81,13 +81,7 @@ pub(super) fn linear(
         // Also at zero coefficient: the derivative with respect to it isn't zero.
         if !surface.is_empty() {
             let kind = Kind::Linear(part(given.part));
-            bodies.push(Dragged::new(
-                body,
-                coefficient,
-                kind,
-                surface,
-                parts.changed,
-            ));
+            bodies.push(Dragged::new(body, coefficient, kind, surface, parts));
         }
     }
     assemble("linear drag", bodies, parts)
@@ -104,13 +98,7 @@ pub(super) fn quadratic(
             Some(given) if !surface.is_empty() => {
                 let coefficient = parameters.declare(owner, QUADRATIC, given.quadratic);
                 let kind = Kind::Quadratic(part(given.quadratic_part));
-                bodies.push(Dragged::new(
-                    body,
-                    coefficient,
-                    kind,
-                    surface,
-                    parts.changed,
-                ));
+                bodies.push(Dragged::new(body, coefficient, kind, surface, parts));
             }
             _ => {
                 parameters.declare(owner, NONE, 0.0);
@@ -177,21 +165,28 @@ impl Dragged {
         coefficient: Parameter,
         kind: Kind,
         surface: &[Element],
-        changed: &[ChangedSurface],
+        parts: &ForceParts,
     ) -> Self {
-        let of = |surface: &[Element]| Self::new(body, coefficient, kind, surface, &[]);
-        let own = changed.iter().filter(|c| c.body == body);
-        let changed = own.map(|c| {
-            let both = c.surfaces.each_ref().map(|s| Box::new(of(s)));
-            (c.parameter, c.step, both)
-        });
-        Self {
-            changed: changed.collect(),
+        let of = |surface: &[Element]| Self {
+            changed: Vec::new(),
             body,
             coefficient,
             kind,
             law: kind.of(surface),
-            surface: surface.to_vec(),
+            surface: match parts.waterline {
+                Some(_) => surface.to_vec(),
+                None => Vec::new(),
+            },
+        };
+        // Also at zero coefficient, as the drag itself: it may be set.
+        let own = parts.changed.iter().filter(|c| c.body == body);
+        let changed = own.map(|c| {
+            let both = c.steps().map(|t| Box::new(of(&(c.surface)(t))));
+            (c.parameter, c.step, both)
+        });
+        Self {
+            changed: changed.collect(),
+            ..of(surface)
         }
     }
 

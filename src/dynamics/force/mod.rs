@@ -24,7 +24,7 @@ mod thruster;
 mod waterline;
 mod weight;
 
-use super::{BodyData, BodyValues, Declarations, Parameter, Parameters};
+use super::{BodyData, BodyValues, Declarations, Parameter, Parameters, Shapes};
 use crate::Result;
 use crate::adjoint::drag::Element;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, linear, six};
@@ -87,23 +87,33 @@ pub struct ForceParts<'a> {
     /// Currents by depth and time.
     pub streams: Arc<Streams>,
     /// Surfaces of bodies whose shapes are parameters, changed.
-    pub changed: &'a [ChangedSurface],
+    pub changed: &'a [ChangedSurface<'a>],
+    /// Shapes that are parameters, and what follows from them.
+    pub shapes: &'a Shapes,
     /// The own added mass of each body that they act on, at unit density, body's frame.
     pub added_mass: Vec<(usize, Mat6)>,
 }
 
-/// A body's surface with a shape parameter a little larger, and a little smaller: what forces take the derivative from that follow from the surface.
-pub struct ChangedSurface {
+/// A body's surface with a shape parameter a little larger, and a little smaller: what forces take the derivative from that follow from the surface. It is made where it is asked for:
+/// those of all vertices of a hull would fill the memory.
+pub struct ChangedSurface<'a> {
     /// The body.
     pub body: usize,
     /// Its parameter.
     pub parameter: Parameter,
     /// The change of it, m.
     pub step: f64,
-    /// The pieces of the surface.
-    pub surfaces: [Vec<Element>; 2],
-    /// The same as closed meshes, where the water has a surface.
-    pub hulls: Option<[Hull; 2]>,
+    /// The pieces of the surface, with the parameter changed by so much.
+    pub surface: Box<dyn Fn(f64) -> Vec<Element> + 'a>,
+    /// The same as a closed mesh.
+    pub hull: Box<dyn Fn(f64) -> Hull + 'a>,
+}
+
+impl ChangedSurface<'_> {
+    /// Larger and smaller by the step.
+    fn steps(&self) -> [f64; 2] {
+        [self.step, -self.step]
+    }
 }
 
 /// A gap that a force of viscous water acts in.

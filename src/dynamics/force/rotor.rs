@@ -1,11 +1,16 @@
 //! Rotors of thrusters: a joint of one velocity n that is driven to a control u by the force (J/T)(u − n).
 //!
 //! J is the inertia that the rotor alone has along its joint with the scene's parameters, its armature among them, so that ṅ = (u − n)/T where what carries it doesn't turn and the water doesn't
-//! hold it: the first-order lag of a speed-controlled motor, whose state is the rotor's velocity.
+//! hold it (with shape parameters J changes as it does in a scene of another shape): the first-order lag of a speed-controlled motor, whose state is the rotor's velocity.
 
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
-use crate::adjoint::rigid::spatial_inertia;
-use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters, Range};
+use crate::adjoint::lie::Vec6;
+use crate::adjoint::rigid::{spatial_inertia, spatial_inertia_vjp};
+use crate::dynamics::Follows;
+use crate::dynamics::parameters::{
+    Declarations, Declared, Owner, Parameter, Parameters, Range, center_of_mass, inertia, mass,
+};
+use std::iter;
 
 const TIME_CONSTANT: Declared = Declared::new("time_constant", "s").range(Range::Positive);
 
@@ -18,6 +23,8 @@ struct Rotor {
     /// J, kg m² or kg.
     inertia: f64,
     time_constant: Parameter,
+    /// How J changes with shape parameters.
+    shapes: Vec<(Parameter, f64)>,
 }
 
 pub(super) fn assemble(
@@ -41,9 +48,30 @@ pub(super) fn assemble(
             control,
             inertia: along.dot(&(matrix * along)) + armature.unwrap_or(0.0),
             time_constant: parameters.declare(owner, TIME_CONSTANT, time),
+            shapes: slopes(parts, body.0, &along),
         });
     }
     (!rotors.is_empty()).then(|| Box::new(Rotors(rotors)) as Box<dyn ForceModel>)
+}
+
+/// How the inertia of a body along `along`, its frame, changes with shape parameters that it follows from.
+fn slopes(parts: &ForceParts, body: usize, along: &Vec6) -> Vec<(Parameter, f64)> {
+    let values = &parts.values[body];
+    let bar = along * along.transpose();
+    let bar = spatial_inertia_vjp(values.mass, &values.center_of_mass, &bar);
+    let by_own = iter::once((mass(body), bar.mass))
+        .chain(inertia(body).into_iter().zip(bar.inertia))
+        .chain(
+            center_of_mass(body)
+                .into_iter()
+                .zip(bar.center.iter().copied()),
+        );
+    let by_own: Vec<(Parameter, f64)> = by_own.collect();
+    let through = |follows: &Follows| {
+        let (_, by_own) = by_own.iter().find(|(own, _)| *own == follows.follower)?;
+        Some((follows.shape, by_own * follows.slope))
+    };
+    parts.shapes.follows.iter().filter_map(through).collect()
 }
 
 impl Rotor {
@@ -81,6 +109,9 @@ impl ForceModel for Rotors {
             bar.v[r.rate] -= gain * z;
             bar.control[r.control] += gain * z;
             bar.parameters[r.time_constant] -= z * r.force(at) / parameters[r.time_constant];
+            for (shape, slope) in &r.shapes {
+                bar.parameters[*shape] += z * slope * r.force(at) / r.inertia;
+            }
         }
     }
 

@@ -54,7 +54,7 @@ pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<d
     let floater = |(body, hull): (usize, &Option<Hull>)| {
         let mut out = Floater::new(body, hull.clone()?)?;
         for changed in parts.changed.iter().filter(|c| c.body == body) {
-            let [more, less] = changed.hulls.clone()?;
+            let [more, less] = changed.steps().map(|t| (changed.hull)(t));
             let both = [Floater::new(body, more)?, Floater::new(body, less)?];
             let both = both.map(Box::new);
             out.changed.push((changed.parameter, changed.step, both));

@@ -1,8 +1,11 @@
 //! The paper's semi-implicit Euler in velocity (Eq. 3–4): v⁺ = v + Δt a(q, v, u), q⁺ = q ⊕ Δt v⁺.
 //!
+//! Joints that follow a motion have its mean velocity over the step in q⁺, and in a the change of its velocity over the step.
+//!
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
 use super::contact;
+use super::split::When;
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
@@ -11,11 +14,13 @@ use crate::dynamics::Inertia;
 use crate::dynamics::slopes::columns;
 use nalgebra::DVector;
 
-/// Acceleration, with the factored mass matrix of free velocities: driven joints reach their new velocity within the step, the
-/// others follow Eq. 3.
+/// Acceleration, with the factored mass matrix of free velocities: driven joints reach the velocity of the step's end within it, the
+/// others follow Eq. 3. Were it the mean velocity of the step that they reach, as that which they move by, half their acceleration would act.
 fn acceleration<'a>(start: &Start<'_, 'a>) -> Result<(DVector<f64>, Inertia<'a>)> {
     let (s, e, split, v) = (start.stepper, start.e, start.split, start.v);
-    let mut driven = (&split.driven - v) / s.dt;
+    let end = (start.state.step + 1) as f64 * s.dt;
+    let reached = s.split(&start.input.hold, When::At(end)).driven;
+    let mut driven = (reached - v) / s.dt;
     for &i in &split.free {
         driven[i] = 0.0;
     }
@@ -61,7 +66,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (q, inputs) = (along.q, along.inputs);
         let force = e.inertial_force_slopes(start.v, &start.input.control, &split.free)?;
         let inertia = e.mass_slopes(&self.acceleration, &split.free, inputs.has_parameters())?;
-        // Driven velocities are reached from where they are.
+        // Driven velocities are reached from where they are: what they reach doesn't depend on the state.
         let mut driven = -along.v / s.dt;
         for &i in &split.free {
             driven.row_mut(i).fill(0.0);
@@ -86,7 +91,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let mut v_bar = self.contact.solve_vjp(start, &after_bar, &mut bar)?;
         split.forget_driven(&mut v_bar);
         bar.v += &v_bar;
-        // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt.
+        // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt, v_d at the step's end.
         let w = self.factor.solve_vjp(&(s.dt * &v_bar));
         let force = e.inertial_force_vjp(start.v, &start.input.control, &w)?;
         bar.v += &force.v;

@@ -187,7 +187,7 @@ impl Rollout {
         let name = |b: usize| format!("body {:?}", system.bodies[b].name);
         Some(format!(
             "lubrication between {} and {} isn't resolved {:.3e} m apart: it is cut into as many faces as there may be, and the longest edge is {:.1} times what the film asks for; its forces may be \
-             far too large: raise the force's roughness, hold the surfaces apart by contact.gap, or take shorter bodies",
+             far off: raise the force's roughness, hold the surfaces apart by contact.gap, or take shorter bodies",
             name(worst.first),
             worst.second.map_or("a wall".into(), name),
             worst.distance,

@@ -136,7 +136,7 @@ impl PlacedBearing {
         self.least.1
     }
 
-    /// Where its faces aren't as small as they should be, as there would be too many: an edge over how long it should be, where that is most.
+    /// Where its faces are far larger than they should be, as there would be too many: an edge over how long it should be, where that is most.
     pub fn coarse(&self) -> Option<f64> {
         self.patch.coarse
     }

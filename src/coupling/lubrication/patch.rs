@@ -22,6 +22,8 @@ const NARROW: f64 = 2.0;
 const ROUNDS: usize = 48;
 /// Most faces.
 const FACES: usize = 8_000;
+/// How many times longer than it should be an edge is from which on that is told: it is as long as the film is wide. Below the damping is hardly off.
+const COARSE: f64 = 1.0 / EVEN;
 /// Cosine between a face's normal and the way across above which it is cut.
 const FACING: f64 = 0.1;
 
@@ -42,7 +44,7 @@ pub(super) struct Patch {
     pub spots: Vec<Spot>,
     /// Corners of each face, and the spots halfway along the edges that begin there.
     pub faces: Vec<([usize; 3], [usize; 3])>,
-    /// Where cutting ended before it was done: an edge over how long it should be, where that is most.
+    /// Where cutting ended long before it was done: an edge over how long it should be, where that is most.
     pub coarse: Option<f64>,
 }
 
@@ -110,6 +112,7 @@ impl Patch {
             wanted = cutter.wanted(&faces);
         }
         let coarse = wanted.iter().map(|x| x.0).reduce(f64::max);
+        let coarse = coarse.filter(|ratio| *ratio > COARSE);
         let faces = (faces.iter())
             .map(|face| (*face, [0, 1, 2].map(|k| cutter.half(edge(face, k)))))
             .collect();

@@ -1,7 +1,7 @@
 //! Bodies that settle in water into a heap: what a step costs, whether any is lost, and how the cost grows with the bodies.
 //!
-//! `cargo bench --bench heap [-- --bodies N] [--seconds T] [--step DT] [--fidelity NAME] [--accuracy A] [--exchange auto|factor|products] [--integrator NAME] [--no-films] [--growth]`: 200 bodies
-//! over 5 s in steps of 0.005 s, `isolated`, by momentum Euler; `--growth` instead 25 to 400 bodies over a shorter time.
+//! `cargo bench --bench heap [-- --bodies N] [--seconds T] [--step DT] [--fidelity NAME] [--accuracy A] [--exchange auto|factor|products] [--integrator NAME] [--no-films] [--roughness R] [--growth]`: 200 bodies
+//! over 5 s in steps of 0.005 s, `isolated`, by momentum Euler; with viscous water in their gaps where a roughness (m) is given; `--growth` instead 25 to 400 bodies over a shorter time.
 
 #[allow(dead_code)]
 mod common;
@@ -9,6 +9,7 @@ mod common;
 use common::arguments;
 use common::support::heap::{Heap, heap};
 use hydrograd::dynamics::Integrator;
+use hydrograd::scene::Lubrication;
 use hydrograd::simulate::Exchange;
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
 use std::time::{Duration, Instant};
@@ -27,6 +28,7 @@ struct Case {
     exchange: Exchange,
     integrator: Integrator,
     films: bool,
+    roughness: Option<f64>,
 }
 
 impl Case {
@@ -42,7 +44,11 @@ impl Case {
             None => settings,
         };
         let start = Instant::now();
-        let simulator = Simulator::new(&heap(self.bodies, self.step), settings)?;
+        let mut scene = heap(self.bodies, self.step);
+        if let Some(roughness) = self.roughness {
+            scene.add_force(Lubrication::new(roughness).into());
+        }
+        let simulator = Simulator::new(&scene, settings)?;
         let prepared = start.elapsed().as_secs_f64();
         let steps = (self.seconds / self.step).round() as usize;
         let controls = Controls::zeros(&simulator, steps);
@@ -115,6 +121,7 @@ fn main() -> hydrograd::Result<()> {
             None => Integrator::MomentumEuler,
         },
         films: !arguments.iter().any(|a| a == "--no-films"),
+        roughness: after("--roughness").map(|x| x.parse().expect("a roughness in m, such as 1e-5")),
     };
     if !arguments.iter().any(|a| a == "--growth") {
         return case.tell().map(drop);

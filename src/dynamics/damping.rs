@@ -1,7 +1,8 @@
 //! Forces that are solved with contact at the end of a step ([`ForceModel::solved_with_contact`]).
 
-use super::force::{ForceModel, LoadBars, Loads, Velocity};
+use super::force::{CoarseGap, ForceModel, LoadBars, Loads, Velocity, coarser};
 use super::{Evaluation, ForceCotangents};
+use crate::Result;
 use crate::adjoint::lie::Vec6;
 use crate::multibody::{Cotangents, Fields};
 use nalgebra::DVector;
@@ -11,6 +12,19 @@ impl Evaluation<'_> {
     pub(super) fn damps(&self) -> bool {
         let place = self.place();
         self.system.dampers().any(|force| force.acts(&place))
+    }
+
+    /// Refuses a configuration at which one of them has no value.
+    pub(super) fn check_damping(&self) -> Result<()> {
+        let place = self.place();
+        (self.system.dampers()).try_for_each(|force| force.check_at(&place))
+    }
+
+    /// The gap that they resolve worst of those that they don't resolve.
+    pub(super) fn coarse_gap(&self) -> Option<CoarseGap> {
+        let place = self.place();
+        let all = self.system.dampers().map(|force| force.coarse_at(&place));
+        all.fold(None, coarser)
     }
 
     fn dampers(&self, mut each: impl FnMut(&dyn ForceModel, &DVector<f64>)) {

@@ -31,7 +31,8 @@ impl Evaluation<'_> {
 
     /// The same of the dampers that are solved with contact alone.
     pub(super) fn damped_islands(&self) -> Islands {
-        self.tied(self.system.dampers().map(|f| f.ties()).collect())
+        let place = self.place();
+        self.tied(self.system.dampers().map(|f| f.ties_at(&place)).collect())
     }
 
     /// Of bodies that joints and these ties hold together; one of all where ties aren't known.

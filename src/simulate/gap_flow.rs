@@ -58,7 +58,7 @@ impl Rollout {
     /// water, at a free surface, and where surfaces overlap.
     ///
     /// # Errors
-    /// A mesh file that can't be read any more; whatever evaluating the system reports.
+    /// A mesh file that can't be read any more; a film whose pressure isn't found; whatever evaluating the system reports.
     pub fn gap_flow(&self) -> Result<Option<GapFlow>> {
         let simulator = self.simulator();
         let density = simulator.parameters().density();
@@ -166,7 +166,10 @@ impl Film {
         };
         let other = second.map_or(Pose::identity(), |b| poses[b]);
         let relative = other.inverse().compose(&poses[first]);
-        Ok(bearing.placed(&relative, roughness).map(|placed| Self {
+        let name = |b: usize| simulator.system().bodies[b].name.as_str();
+        let placed = bearing.placed(&relative, roughness);
+        let placed = placed.map_err(|why| why.error(name(first), second.map(name)))?;
+        Ok(placed.map(|placed| Self {
             first,
             second,
             frame: Pose::new(other.rotation, poses[first].translation),

@@ -5,6 +5,7 @@ use super::observable::{Reading, differentiable, observable, velocity};
 use super::trajectory::Seed;
 use super::{Cotangents, GapReport, Gradient, Sample, Simulator};
 use crate::adjoint::step::{self, Tape};
+use crate::dynamics::force::coarser;
 use crate::dynamics::{ContactForce, State, StateBar, StepRecord};
 use crate::error::readable;
 use crate::geometry::Gap;
@@ -174,7 +175,24 @@ impl Rollout {
             .chain(self.energy_warning())
             .chain(self.loss_warning())
             .chain(self.rest_warning());
-        all.chain(self.passing_warning()).collect()
+        let all = all.chain(self.passing_warning());
+        all.chain(self.coarse_warning()).collect()
+    }
+
+    /// The gap whose viscous water was resolved worst, where it wasn't.
+    fn coarse_warning(&self) -> Option<String> {
+        let system = self.simulator.system();
+        let each = self.tape.records().iter().map(StepRecord::coarse);
+        let worst = each.fold(None, coarser)?;
+        let name = |b: usize| format!("body {:?}", system.bodies[b].name);
+        Some(format!(
+            "lubrication between {} and {} isn't resolved {:.3e} m apart: it is cut into as many faces as there may be, and the longest edge is {:.1} times what the film asks for; its forces may be \
+             far off: raise the force's roughness, hold the surfaces apart by contact.gap, or take shorter bodies",
+            name(worst.first),
+            worst.second.map_or("a wall".into(), name),
+            worst.distance,
+            worst.ratio,
+        ))
     }
 
     /// What was gone deep into in spite of all pieces.

@@ -31,7 +31,10 @@ fn raised(height: f64) -> Pose {
 }
 
 fn at(bearing: &Bearing, height: f64) -> PlacedBearing {
-    bearing.placed(&raised(height), SMOOTH).expect("a film")
+    bearing
+        .placed(&raised(height), SMOOTH)
+        .unwrap()
+        .expect("a film")
 }
 
 fn near(found: f64, exact: f64, part: f64) {
@@ -105,7 +108,11 @@ fn tilted_strips_are_those_of_one_dimension() {
         let turn = exp_matrix(&Vec3::new(0.0, -tilt, 0.0));
         let height = low + 0.5 * (width * tilt.sin() + thick * tilt.cos());
         let pose = Pose::new(turn, Vec3::new(0.0, 0.0, height));
-        let c = strip.placed(&pose, SMOOTH).expect("a film").damping;
+        let c = strip
+            .placed(&pose, SMOOTH)
+            .unwrap()
+            .expect("a film")
+            .damping;
         let steps = 4000;
         let dx = width / f64::from(steps);
         let sum = |power: i32| -> f64 {
@@ -128,7 +135,7 @@ fn tilted_strips_are_those_of_one_dimension() {
 fn roughness_ends_the_growth() {
     let disc = bearing(&Shape::cylinder(1.0, 0.25), 1280, None, 1.0);
     let r = 1e-3;
-    let c = |d: f64| disc.placed(&raised(0.125 + d), r).unwrap().damping[(2, 2)];
+    let c = |d: f64| disc.placed(&raised(0.125 + d), r).unwrap().unwrap().damping[(2, 2)];
     let touching = 1.5 * PI / r.powi(3);
     near(c(0.0), touching, 0.015);
     near(c(r), touching / 8.0, 0.015);
@@ -144,7 +151,7 @@ fn it_has_no_scale() {
         let disc = bearing(&Shape::cylinder(size, 0.25 * size), 1280, None, size);
         let turn = exp_matrix(&Vec3::new(0.004, -0.003, 0.2));
         let pose = Pose::new(turn, Vec3::new(0.0, 0.0, 0.14 * size));
-        disc.placed(&pose, 1e-4 * size).unwrap().damping
+        disc.placed(&pose, 1e-4 * size).unwrap().unwrap().damping
     };
     let [one, small, large] = [1.0, 1e-3, 1e3].map(c);
     for (other, size) in [(small, 1e-3_f64), (large, 1e3)] {
@@ -169,8 +176,8 @@ fn it_is_semi_definite_and_ends() {
     );
     let turn = exp_matrix(&Vec3::new(0.02, -0.05, 0.4));
     let pose = |z: f64| Pose::new(turn, Vec3::new(0.3, 0.2, z));
-    let c = blocks.placed(&pose(0.43), 1e-4).unwrap().damping;
+    let c = blocks.placed(&pose(0.43), 1e-4).unwrap().unwrap().damping;
     let least = c.symmetric_eigenvalues().min();
     assert!(least > -1e-12 * c.amax(), "{least}");
-    assert!(blocks.placed(&pose(1.2), 1e-4).is_none());
+    assert!(blocks.placed(&pose(1.2), 1e-4).unwrap().is_none());
 }

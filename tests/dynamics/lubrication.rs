@@ -1,10 +1,13 @@
 //! Viscous water in thin gaps as bodies move: what terminal motions it leads to, that it makes no energy, and gradients through it.
 
 use crate::support::says;
+use hydrograd::adjoint::lie::Vec6;
 use hydrograd::dynamics::Integrator;
+use hydrograd::dynamics::force::{ForceModel, Loads, Place};
 use hydrograd::scene::{Body, Contact, Fluid, Joint, Lubrication, Scene, Shape, Wall, WallSurface};
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator};
+use nalgebra::DVector;
 use std::f64::consts::PI;
 
 const GRAVITY: f64 = 9.81;
@@ -254,6 +257,110 @@ fn a_run_tells_which_rules() {
             .unwrap()
             .is_some_and(|f| f.lubricated)
     );
+}
+
+/// What forces of viscous water tie together where a run starts, and the wrenches that they put on bodies which move with these twists.
+fn ties_and_wrenches(sim: &Simulator, twists: &[Vec6]) -> (Vec<[usize; 2]>, Vec<Vec6>) {
+    let system = sim.system();
+    let rollout = sim.rollout(&Controls::zeros(sim, 1)).unwrap();
+    let (start, v) = (&rollout.samples()[0], DVector::zeros(6 * twists.len()));
+    let place = Place {
+        poses: &start.poses,
+        q: &start.q,
+        time: 0.0,
+        parameters: sim.parameters(),
+    };
+    let mut forces = system.forces.iter();
+    let force: &dyn ForceModel = forces.find(|f| f.name() == "lubrication").unwrap().as_ref();
+    let control = DVector::zeros(0);
+    let mut loads = Loads::zeros(twists.len(), v.len());
+    force.add(&system.moving(place, twists, &v, &control), &mut loads);
+    (force.ties_at(&place).unwrap(), loads.wrenches)
+}
+
+/// Of many bodies those alone are tied, and looked at, that have water between them; it does there what it does where there are no others.
+#[test]
+fn only_near_bodies_are_tied() {
+    let place = |b: usize| match b % 4 {
+        // Two at a gap of 1 mm, one at 30 mm, past the film's reach, and one far away.
+        1 => [0.5 * (b - 1) as f64, 0.041, 0.0],
+        2 => [0.5 * (b - 2) as f64, -0.07, 0.0],
+        _ => [0.5 * b as f64, 0.0, 0.0],
+    };
+    let made = |bodies: &[usize]| {
+        let mut scene = Scene::new(Fluid::none());
+        scene.time_step = 1e-3;
+        for b in bodies {
+            let ball = Body::new(Shape::sphere(0.02).faces(320)).density(1200.0);
+            scene.add(ball.named(format!("{b}")).at(place(*b)));
+            scene.initial.v.extend([0.0; 3]);
+            scene
+                .initial
+                .v
+                .extend([0.01 * (*b as f64).cos(), -0.02, 0.003 * *b as f64]);
+        }
+        scene.add_force(Lubrication::new(1e-5).viscosity(1.0).into());
+        scene
+    };
+    let twist = |b: &usize| Vec6::from_fn(|i, _| ((7 * b + i) as f64).sin());
+    let all: Vec<usize> = (0..32).collect();
+    let twists: Vec<Vec6> = all.iter().map(twist).collect();
+    let many = made(&all);
+    let (ties, wrenches) = ties_and_wrenches(&simulator(&many), &twists);
+    let mut tied: Vec<[usize; 2]> = ties;
+    tied.iter_mut().for_each(|pair| pair.sort_unstable());
+    let near = all.chunks(4).map(|four| [four[0], four[1]]);
+    assert_eq!(tied, near.clone().collect::<Vec<_>>());
+    let last = |scene: &Scene| run(scene, 3).samples()[3].clone();
+    let moved = last(&many);
+    for pair in near {
+        let two = made(&pair);
+        let (_, own) = ties_and_wrenches(&simulator(&two), &pair.map(|b| twist(&b)));
+        let after = last(&two);
+        for (k, b) in pair.into_iter().enumerate() {
+            assert!(own[k].norm() > 1e-3);
+            assert_eq!(own[k], wrenches[b]);
+            let [one, other] = [after.v.rows(6 * k, 6), moved.v.rows(6 * b, 6)];
+            assert!(
+                (one - other).amax() < 1e-9 * one.amax(),
+                "{b}: {one} {other}"
+            );
+        }
+        for b in pair.map(|b| b + 2) {
+            assert_eq!(wrenches[b], Vec6::zeros());
+        }
+    }
+}
+
+/// A pressure that numbers don't hold is an error that names the gap: it was taken for an open one, in which nothing resists.
+#[test]
+fn what_has_no_pressure_is_refused() {
+    let disc = Body::new(Shape::cylinder(0.03, 0.02).faces(320))
+        .named("disc")
+        .density(2000.0);
+    let scene = over_floor(disc, -1e-6, 0.01, 1e-3, 1e-140);
+    let sim = simulator(&scene);
+    let error = sim.rollout(&Controls::zeros(&sim, 1)).err().unwrap();
+    let words = ["lubrication between body \"disc\" and a wall", "roughness"];
+    says(&error, &words);
+}
+
+/// A long cylinder all but on a floor has a narrow film that no faces resolve: the run says so, and nothing of the spot under a ball.
+#[test]
+fn a_film_that_faces_do_not_resolve_is_told() {
+    let told = |shape: Shape, gap: f64| {
+        let body = Body::new(shape.faces(320)).named("log").density(1200.0);
+        let body = body.rotated([0.5 * PI, 0.0, 0.0]);
+        run(&over_floor(body, gap, 0.02, 1e-3, 1e-12), 1).warnings()
+    };
+    let is_coarse = |w: &&String| w.contains("isn't resolved") && w.contains("lubrication");
+    let narrow = told(Shape::cylinder(0.02, 4.0), 1e-7);
+    let found = narrow.iter().find(is_coarse).expect("a warning");
+    for words in ["body \"log\" and a wall", "m apart", "times"] {
+        assert!(found.contains(words), "{found}");
+    }
+    let round = told(Shape::sphere(0.02), 2e-5);
+    assert_eq!(round.iter().find(is_coarse), None);
 }
 
 /// What a scene may not say, and with what it may not be stepped.

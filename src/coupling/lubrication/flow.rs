@@ -4,6 +4,7 @@ use super::Bearing;
 use super::element::{Cell, Point, fade, opening};
 use super::patch::Patch;
 use super::thickness::{Thickness, thickness};
+use crate::Error;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, point_velocity, point_wrench};
 use crate::solver::{SparsePattern, elimination_order};
 use nalgebra::{DMatrix, SMatrix};
@@ -40,9 +41,42 @@ pub(super) struct Layer {
     pub number: Option<usize>,
 }
 
+/// Why there is no pressure in a gap with water in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Unsolved {
+    /// The shortest distance of the surfaces there, m.
+    pub distance: f64,
+    /// m
+    pub roughness: f64,
+}
+
+impl Unsolved {
+    /// The same of the gap between bodies of these names, of the second none for a wall.
+    pub fn error(&self, first: &str, second: Option<&str>) -> Error {
+        let other = second.map_or("a wall".into(), |name| format!("body {name:?}"));
+        Error::Solver {
+            what: format!(
+                "lubrication between body {first:?} and {other}, {:.3e} m apart at a roughness of {:.3e} m",
+                self.distance, self.roughness
+            ),
+            iterations: 0,
+            residual: f64::INFINITY,
+            tolerance: 0.0,
+            remedy: "the pressure there is more than numbers hold: give the force the roughness that the surfaces have, or contact a gap that holds them apart"
+                .into(),
+        }
+    }
+}
+
 impl PlacedBearing {
-    pub(super) fn new(bearing: &Bearing, relative: &Pose, roughness: f64) -> Option<Self> {
-        let patch = Patch::new(bearing, relative, roughness)?;
+    pub(super) fn new(
+        bearing: &Bearing,
+        relative: &Pose,
+        roughness: f64,
+    ) -> Result<Option<Self>, Unsolved> {
+        let Some(patch) = Patch::new(bearing, relative, roughness) else {
+            return Ok(None);
+        };
         let layer = |distance: f64| Layer {
             thickness: thickness(distance, roughness),
             outside: (distance / bearing.reach - RIM[0]) / (RIM[1] - RIM[0]),
@@ -68,11 +102,11 @@ impl PlacedBearing {
                 }
             }
         }
-        if active == 0 {
-            return None;
-        }
         let fields = patch.spots.iter().map(|spot| &spot.field);
-        let least = fields.min_by(|a, b| a.distance.total_cmp(&b.distance))?;
+        let least = fields.min_by(|a, b| a.distance.total_cmp(&b.distance));
+        let Some(least) = least.filter(|_| active > 0) else {
+            return Ok(None);
+        };
         let least = (least.distance, least.gradient);
         let mut out = Self {
             damping: Mat6::zeros(),
@@ -82,8 +116,14 @@ impl PlacedBearing {
             layers,
             cells,
         };
-        out.fill()?;
-        out.damping.iter().all(|x| x.is_finite()).then_some(out)
+        let filled = out.fill().is_some();
+        match filled && out.damping.iter().all(|x| x.is_finite()) {
+            true => Ok(Some(out)),
+            false => Err(Unsolved {
+                distance: out.distance(),
+                roughness,
+            }),
+        }
     }
 
     /// The shortest distance of the surfaces, m.
@@ -94,6 +134,11 @@ impl PlacedBearing {
     /// Unit vector from what is opposite to where the first is nearest, axes of the other.
     pub fn way(&self) -> Vec3 {
         self.least.1
+    }
+
+    /// Where its faces are far larger than they should be, as there would be too many: an edge over how long it should be, where that is most.
+    pub fn coarse(&self) -> Option<f64> {
+        self.patch.coarse
     }
 
     /// Number of pressures.

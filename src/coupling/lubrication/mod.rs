@@ -28,12 +28,14 @@
 
 mod element;
 mod flow;
+mod near;
 mod patch;
 mod pull;
 mod surface;
 mod thickness;
 
-pub use flow::PlacedBearing;
+pub use flow::{PlacedBearing, Unsolved};
+pub(crate) use near::NearBearings;
 pub(crate) use surface::BearingSurface;
 
 use crate::adjoint::lie::Pose;
@@ -53,8 +55,15 @@ pub struct Bearing {
 
 impl Bearing {
     /// At a pose of the first in the frame of the other, with surfaces of this roughness (m, above zero), at unit viscosity; `None` where they are farther apart
-    /// than the water between them reaches, or no solution is found.
-    pub fn placed(&self, relative: &Pose, roughness: f64) -> Option<PlacedBearing> {
+    /// than the water between them reaches.
+    ///
+    /// # Errors
+    /// A pressure that isn't found.
+    pub fn placed(
+        &self,
+        relative: &Pose,
+        roughness: f64,
+    ) -> Result<Option<PlacedBearing>, Unsolved> {
         PlacedBearing::new(self, relative, roughness)
     }
 }

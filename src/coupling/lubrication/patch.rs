@@ -22,6 +22,8 @@ const NARROW: f64 = 2.0;
 const ROUNDS: usize = 48;
 /// Most faces.
 const FACES: usize = 8_000;
+/// How many times longer than it should be an edge is from which on that is told: it is as long as the film is wide. Below the damping is hardly off.
+const COARSE: f64 = 1.0 / EVEN;
 /// Cosine between a face's normal and the way across above which it is cut.
 const FACING: f64 = 0.1;
 
@@ -42,6 +44,8 @@ pub(super) struct Patch {
     pub spots: Vec<Spot>,
     /// Corners of each face, and the spots halfway along the edges that begin there.
     pub faces: Vec<([usize; 3], [usize; 3])>,
+    /// Where cutting ended long before it was done: an edge over how long it should be, where that is most.
+    pub coarse: Option<f64>,
 }
 
 /// A patch in the making.
@@ -97,20 +101,28 @@ impl Patch {
         if faces.is_empty() {
             return None;
         }
+        let mut wanted = cutter.wanted(&faces);
         for _ in 0..ROUNDS {
-            cutter.survey(&faces);
-            let marked = cutter.marked(&faces);
-            if marked.is_empty() || faces.len() + marked.len() > FACES {
+            let room = FACES.saturating_sub(faces.len());
+            let marked = cutter.marked(&faces, &wanted, room);
+            if marked.is_empty() {
                 break;
             }
             faces = cutter.cut(&faces, &marked);
+            wanted = cutter.wanted(&faces);
         }
+        let coarse = wanted.iter().map(|x| x.0).reduce(f64::max);
+        let coarse = coarse.filter(|ratio| *ratio > COARSE);
         let faces = (faces.iter())
             .map(|face| (*face, [0, 1, 2].map(|k| cutter.half(edge(face, k)))))
             .collect();
         let spots = cutter.spots;
         let within = spots.iter().any(|s| s.field.distance < bearing.reach);
-        within.then_some(Self { spots, faces })
+        within.then_some(Self {
+            spots,
+            faces,
+            coarse,
+        })
     }
 }
 
@@ -197,13 +209,13 @@ impl Cutter<'_> {
         spot
     }
 
-    /// Whether a face is too large for what the thickness does in it.
-    fn wanted(&mut self, face: &[usize; 3]) -> bool {
+    /// Where a face is too large for what the thickness does in it: its longest edge, over how long that should be.
+    fn excess(&mut self, face: &[usize; 3]) -> Option<f64> {
         let distances = face.map(|s| self.spots[s].field.distance);
         let low = distances.into_iter().fold(f64::INFINITY, f64::min);
         let (k, length) = self.longest(face);
         if low - 0.5 * length > self.bearing.reach || !self.facing(face).0 {
-            return false;
+            return None;
         }
         let heights = face.map(|s| self.height(s));
         // Between corners that are as near as one another a round face may be nearer.
@@ -213,25 +225,63 @@ impl Cutter<'_> {
             [low.min(h), f64::max(high, h)]
         });
         let allowed = RATIO * (low / self.least).max(1.0).powf(EASED);
-        if low < NARROW * self.least && length > self.even {
-            return true;
-        }
         let steep = high - low > STEEP * length;
         let shortest = match steep {
             true => ACROSS * self.bearing.surface.size,
             false => low,
         };
-        high > allowed * low && length > shortest
+        let wide = low < NARROW * self.least && length > self.even;
+        let uneven = high > allowed * low && length > shortest;
+        let wide = wide.then(|| length / self.even);
+        // As if the thickness changed evenly along the edge.
+        let uneven =
+            uneven.then(|| ((high - low) / ((allowed - 1.0) * low)).min(length / shortest));
+        wide.into_iter().chain(uneven).reduce(f64::max)
     }
 
-    /// Edges to halve: the longest ones of faces that are too large, and of those that have one of them.
-    fn marked(&mut self, faces: &[[usize; 3]]) -> BTreeMap<[usize; 2], usize> {
-        let mut marked = BTreeMap::new();
-        for face in faces {
-            if self.wanted(face) {
-                let edge = edge(face, self.longest(face).0);
-                marked.insert(edge, self.half(edge));
+    /// The faces that are too large, by how much: numbers of faces, ascending.
+    fn wanted(&mut self, faces: &[[usize; 3]]) -> Vec<(f64, usize)> {
+        self.survey(faces);
+        let each = faces.iter().enumerate();
+        each.filter_map(|(i, face)| Some((self.excess(face)?, i)))
+            .collect()
+    }
+
+    /// Edges to halve: of these faces, or of those that are too large by most where all would be more than there is room for.
+    fn marked(
+        &mut self,
+        faces: &[[usize; 3]],
+        wanted: &[(f64, usize)],
+        room: usize,
+    ) -> BTreeMap<[usize; 2], usize> {
+        let all = self.closed(faces, wanted);
+        if all.len() <= room {
+            return all;
+        }
+        let mut worst = wanted.to_vec();
+        worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Those of more faces are never fewer.
+        let (mut few, mut many) = (0, worst.len());
+        while many - few > 1 + worst.len() / 64 {
+            let half = usize::midpoint(few, many);
+            match self.closed(faces, &worst[..half]).len() <= room {
+                true => few = half,
+                false => many = half,
             }
+        }
+        self.closed(faces, &worst[..few])
+    }
+
+    /// The longest edges of some of the faces, and of those that have one of them.
+    fn closed(
+        &mut self,
+        faces: &[[usize; 3]],
+        some: &[(f64, usize)],
+    ) -> BTreeMap<[usize; 2], usize> {
+        let mut marked = BTreeMap::new();
+        for (_, i) in some {
+            let edge = edge(&faces[*i], self.longest(&faces[*i]).0);
+            marked.insert(edge, self.half(edge));
         }
         loop {
             let mut more = false;

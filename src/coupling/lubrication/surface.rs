@@ -2,8 +2,7 @@
 
 use crate::adjoint::lie::Vec3;
 use crate::coupling::film::TOGETHER;
-use crate::geometry::{Cluster, clusters};
-use crate::geometry::{Solid, TriMesh};
+use crate::geometry::{Casing, Cluster, Solid, TriMesh, bounds, clusters};
 
 /// Cosine between normals of a shape and of its mesh from which on they are the same one's.
 const ROUND: f64 = 0.9;
@@ -19,6 +18,8 @@ pub struct BearingSurface {
     /// The exact shape.
     pub solid: Option<Solid>,
     pub clusters: Vec<Cluster>,
+    /// A box around it, and around the exact shape.
+    pub(crate) casing: Casing,
     /// Diameter of the ball around it, m.
     pub size: f64,
     /// The longest edge, m.
@@ -34,12 +35,15 @@ impl BearingSurface {
             [(a, b), (b, c), (c, a)].map(|(a, b)| (vertices[a] - vertices[b]).norm())
         });
         let normals = mesh.vertex_normals();
+        let own = Casing::new(bounds(vertices.iter()));
+        let exact = solid.map(|solid| Casing::new(solid.bounds()));
         let upright = |(x, n): (&Vec3, &Vec3)| solid.map_or(*n, |solid| normal(solid, x, n));
         Self {
             longest: edges.fold(0.0, f64::max),
             normals: vertices.iter().zip(&normals).map(upright).collect(),
             faces: mesh.faces().to_vec(),
             solid: solid.cloned(),
+            casing: exact.map_or(own, |exact| own.joined(exact)),
             clusters: clusters(&vertices, TOGETHER),
             size: 2.0 * mesh.bounding_ball().radius,
             vertices,

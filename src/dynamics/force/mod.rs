@@ -117,6 +117,7 @@ impl ChangedSurface<'_> {
 }
 
 /// A gap that a force of viscous water acts in.
+#[derive(Clone)]
 pub struct Lubricated {
     /// The force's number in the scene.
     pub force: usize,
@@ -126,6 +127,25 @@ pub struct Lubricated {
     pub second: Option<usize>,
     /// The two surfaces.
     pub bearing: Bearing,
+}
+
+/// A gap whose viscous water would take more faces than there may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoarseGap {
+    /// The body on whose surface it is solved.
+    pub first: usize,
+    /// The other one; none for a wall.
+    pub second: Option<usize>,
+    /// The shortest distance of the surfaces, m.
+    pub distance: f64,
+    /// An edge of a face over how long it should be, where that is most.
+    pub ratio: f64,
+}
+
+/// The worse one of both.
+pub(crate) fn coarser(a: Option<CoarseGap>, b: Option<CoarseGap>) -> Option<CoarseGap> {
+    let both = a.into_iter().chain(b);
+    both.reduce(|a, b| if b.ratio > a.ratio { b } else { a })
 }
 
 /// All forces of a scene.
@@ -313,6 +333,19 @@ pub trait ForceModel: Send + Sync {
         false
     }
 
+    /// Refuses a place at which it has no value; asked of those that are solved with contact, once a step before they are.
+    ///
+    /// # Errors
+    /// A solve of its own that fails there.
+    fn check_at(&self, _place: &Place) -> Result<()> {
+        Ok(())
+    }
+
+    /// The gap that it resolves worst of those that it doesn't resolve there; asked of those that are solved with contact.
+    fn coarse_at(&self, _place: &Place) -> Option<CoarseGap> {
+        None
+    }
+
     /// Whether it does anything there at some velocity; asked of those that are solved with contact.
     fn acts(&self, _place: &Place) -> bool {
         true
@@ -326,6 +359,11 @@ pub trait ForceModel: Send + Sync {
     /// Pairs of bodies of which it makes one feel how the other moves or where it is; `None` where it may be any.
     fn ties(&self) -> Option<Vec<[usize; 2]>> {
         None
+    }
+
+    /// Those that there are at a place; asked of those that are solved with contact.
+    fn ties_at(&self, _place: &Place) -> Option<Vec<[usize; 2]>> {
+        self.ties()
     }
 
     /// Whether it changes no energy but its own potential one, at these parameters and where nothing is controlled.

@@ -62,6 +62,7 @@ struct Step {
 /// The velocity after contact, from the one before it; the same bits where nothing presses.
 pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>> {
     let (e, split, dt) = (start.near, start.split, start.stepper.dt);
+    e.check_damping()?;
     // At no force v* is the least of the convex problem.
     if split.free.is_empty() || !e.contact_acts(before) {
         return Ok(before.clone());

@@ -11,6 +11,7 @@ use super::{Input, Integrator, State, Stepper};
 use super::{euler, midpoint, runge_kutta, velocity_euler};
 use crate::dynamics::answers::Answers;
 use crate::dynamics::contact_force::contact_forces;
+use crate::dynamics::force::{CoarseGap, coarser};
 use crate::dynamics::{ContactForce, Linearisation};
 use crate::{Error, Result};
 use nalgebra::DVector;
@@ -21,6 +22,7 @@ struct Piece {
     stages: Stages,
     answers: Answers,
     passed: Stops,
+    coarse: Option<CoarseGap>,
 }
 
 impl<'a> Stepper<'a> {
@@ -86,6 +88,7 @@ impl<'a> Stepper<'a> {
             stages,
             answers,
             mut passed,
+            mut coarse,
         } = stepper.piece(e, &first, v, input, plan)?;
         let mut later = Vec::with_capacity(n - 1);
         // What was passed is made again in more pieces, if there may be more.
@@ -94,6 +97,7 @@ impl<'a> Stepper<'a> {
             let v = stepper.velocity(&e, &next)?;
             let piece = stepper.piece(&e, &next, &v, input, plan)?;
             passed.add(&piece.passed);
+            coarse = coarser(coarse, piece.coarse);
             let state = std::mem::replace(&mut next, piece.next);
             later.push(LaterPiece {
                 state,
@@ -117,6 +121,7 @@ impl<'a> Stepper<'a> {
             answers,
             later,
             passed,
+            coarse,
         };
         Ok((next, record))
     }
@@ -161,6 +166,7 @@ impl<'a> Stepper<'a> {
             next,
             stages,
             passed,
+            coarse: start.near.coarse_gap(),
         })
     }
 

@@ -11,6 +11,7 @@ use super::{Input, Integrator, State, StateBar, StateTangents, StepBar, StepTang
 use super::{euler, midpoint, runge_kutta, velocity_euler};
 use crate::Result;
 use crate::dynamics::answers::Answers;
+use crate::dynamics::force::CoarseGap;
 use crate::dynamics::{Evaluation, InputTangents, Linearisation};
 use nalgebra::{DMatrix, DVector};
 
@@ -30,6 +31,7 @@ pub struct StepRecord {
     pub(super) answers: Answers,
     pub(super) later: Vec<LaterPiece>,
     pub(super) passed: Stops,
+    pub(super) coarse: Option<CoarseGap>,
 }
 
 /// A piece of a step after its first.
@@ -66,6 +68,11 @@ impl StepRecord {
     /// What it went deep into, or past a joint's limit, in as many pieces as there may be.
     pub fn passed(&self) -> &Stops {
         &self.passed
+    }
+
+    /// The gap with viscous water that was resolved worst, of those that weren't.
+    pub fn coarse(&self) -> Option<CoarseGap> {
+        self.coarse
     }
 
     /// Velocities before and after contact, of a step in pieces those of the first; none of integrators that don't solve it.

@@ -43,7 +43,6 @@ pub(super) fn assemble(
             v: link.v.start,
             range,
             rigid: asked(b).is_none(),
-            scale: 1.0,
             law: Law {
                 stiffness,
                 dissipation: 0.0,

@@ -4,7 +4,7 @@
 //! [`contact_force`] of a point that moves along its normal. The coordinate's rate is its velocity in the user's coordinates and
 //! in the frame's (X = 1 for a joint with one coordinate), and so the force is the same in both.
 
-use super::contact::{eased, sharpened};
+use super::contact::sharpened;
 use crate::adjoint::contact::{
     Law, PointState, Push, Rates, contact_force, contact_force_jvp, contact_force_vjp,
 };
@@ -21,8 +21,6 @@ pub struct JointLimit {
     pub range: [f64; 2],
     /// Law of the stops: lengths in m or rad, forces in N or N m.
     pub law: Law,
-    /// The law's stiffness over that of the whole step: the square of its sharpness.
-    pub scale: f64,
     /// Whether its stiffness is near rigid at the time step, so that it rises where a step is cut; one that was given stays what it is.
     pub rigid: bool,
 }
@@ -49,22 +47,18 @@ impl JointLimit {
     /// The same with a law that is as stiff in the `n`-th part of a step as it was in the whole.
     pub(super) fn sharpened(&self, n: usize) -> Self {
         Self {
-            law: sharpened(self.law, n),
-            scale: (n * n) as f64,
+            law: Law {
+                width: self.law.width,
+                ..sharpened(self.law, n)
+            },
             ..self.clone()
         }
     }
 
-    /// The gaps to the lower and the upper end that the law is asked with at the coordinate `q`, with their slopes.
-    fn gaps(&self, q: f64) -> [(f64, f64); 2] {
-        let [lower, upper] = self.range;
-        [q - lower, upper - q].map(|gap| eased(&self.law, self.scale, gap))
-    }
-
     /// The point_state with either stop at the coordinate `q` and its rate `v`, with the sign of the force's direction.
     fn point_states(&self, q: f64, v: f64) -> [(f64, PointState); 2] {
-        let [(lower, _), (upper, _)] = self.gaps(q);
-        [(1.0, lower), (-1.0, upper)].map(|(sign, gap)| {
+        let [lower, upper] = self.range;
+        [(1.0, q - lower), (-1.0, upper - q)].map(|(sign, gap)| {
             let point_state = PointState {
                 gap,
                 weight: 1.0,
@@ -92,14 +86,13 @@ impl JointLimit {
     /// Transpose of the sum of [`JointLimit::forces`]: cotangents of `q` and `v`.
     pub fn forces_vjp(&self, q: f64, v: f64, bar: f64) -> [f64; 2] {
         let mut out = [0.0; 2];
-        let stops = self.point_states(q, v).into_iter().zip(self.gaps(q));
-        for ((sign, m), (_, slope)) in stops {
+        for (sign, m) in self.point_states(q, v) {
             let push = Push {
                 force: Vec3::x() * (sign * bar),
                 ..Push::default()
             };
             let own = contact_force_vjp(&self.law, &m, &push);
-            out[0] += sign * slope * own.gap;
+            out[0] += sign * own.gap;
             out[1] += sign * own.rates.velocity.x;
         }
         out

@@ -1,6 +1,6 @@
 //! What of a URDF file is read, as a text of its own: of that alone the typed form is made, so that nothing else can be wrong with it.
 
-use super::read::{needed_attributes, read_attributes};
+use super::known::{needed_attributes, read_attributes};
 use super::tree::unplaced;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector4};
 use quick_xml::Writer;

@@ -12,6 +12,7 @@ mod hull;
 mod inertia;
 mod joints;
 mod kept;
+mod known;
 mod massless;
 mod mjcf;
 mod options;

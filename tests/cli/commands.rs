@@ -216,7 +216,7 @@ fn the_hull_of_a_bad_mesh_can_be_simulated() {
     fails(
         &["check-mesh", &flat, "--hull", &hull],
         1,
-        &["flat.obj", "no volume"],
+        &["flat.obj", "no hull with a volume"],
     );
     fails(
         &["check-mesh", &open, "--hull", "hull.off"],

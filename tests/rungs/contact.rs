@@ -60,7 +60,6 @@ fn limit() -> JointLimit {
         v: 0,
         range: [-0.1, 0.1],
         rigid: true,
-        scale: 1.0,
         law: Law {
             stiffness: 3e3,
             dissipation: 0.2,

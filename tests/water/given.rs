@@ -21,8 +21,11 @@ const HOW: [(Fidelity, Method); 6] = [
 
 fn settings((fidelity, method): (Fidelity, Method)) -> Settings {
     let settings = Settings::default().fidelity(fidelity).method(method);
-    // At `auto`'s own accuracy pairs this near begin to fade out, from where what is given says.
-    settings.tolerance(1e-13).accuracy(1e-3)
+    match fidelity {
+        Fidelity::Full => settings.tolerance(1e-13),
+        // At `auto`'s own accuracy pairs this near begin to fade out, from where what is given says.
+        _ => settings.accuracy(1e-3),
+    }
 }
 
 fn water() -> Scene {

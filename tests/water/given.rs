@@ -22,6 +22,7 @@ const HOW: [(Fidelity, Method); 6] = [
 fn settings((fidelity, method): (Fidelity, Method)) -> Settings {
     let settings = Settings::default().fidelity(fidelity).method(method);
     match fidelity {
+        Fidelity::Isolated => settings,
         Fidelity::Full => settings.tolerance(1e-13),
         // At `auto`'s own accuracy pairs this near begin to fade out, from where what is given says.
         _ => settings.accuracy(1e-3),

@@ -47,6 +47,7 @@ pub(crate) mod weld;
 pub(crate) use beneath::Beneath;
 pub(crate) use broad::{Neighbours, Region};
 pub(crate) use casing::Casing;
+#[cfg(feature = "meshio")]
 pub(crate) use check::has_area;
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
 pub(crate) use cluster::{Cluster, clusters};

@@ -71,7 +71,7 @@ fn quaternions_are_taken_to_the_last_digits() {
         let origin = format!("<origin xyz=\"0 0 0\" {turn}/>");
         pair("fixed", &origin).replace("name=\"r\"", "name=\"r\" version=\"1.1\"")
     };
-    for angle in [1.5678, 1.570_796, -1.5705, 0.3] {
+    for angle in [1.5678, 1.570_797, -1.5705, 0.3] {
         let right = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
         let [x, y, z, w] = right.coords.into();
         let turn = format!("quat_xyzw=\"{x} {y} {z} {w}\"");

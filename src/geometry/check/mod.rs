@@ -8,6 +8,7 @@ mod scan;
 
 pub use scan::check_parts;
 pub(super) use scan::check_rounded;
+#[cfg(feature = "meshio")]
 pub(crate) use scan::has_area;
 
 use crate::error::{Error, Result};

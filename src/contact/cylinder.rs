@@ -3,16 +3,17 @@
 //! - Each rim: its lowest point, and points that stay in place ([`super::rim`]).
 //! - Each corner of the core in the cylinder's signed distance.
 //! - Each edge of the core that passes over an end: where it comes over the rim ([`super::over_rim`]).
+//! - The edge of a capsule that passes level over a rim along its tangent.
 //! - Each edge of the core across the cylinder's side, which is as far as the axis less the radius.
 //!
 //! A ball has its centre alone.
 
 use super::core_core::{self, DEPTH, END, crossing};
-use super::over_rim::{Rim, edge_over};
+use super::over_rim::{Rim, edge_over, tangent_over};
 use super::point::ContactPoint;
 use super::rim::{self, SIDES, axis};
 use super::sunk::sunk;
-use super::{plane, round_core};
+use super::{plane, round_core, weight};
 use crate::geometry::HalfSpace;
 use crate::geometry::convex::{AtCorner, Core, Cylinder, Edge};
 use hydrograd_adjoint::lie::{Pose, Vec3};
@@ -47,19 +48,18 @@ pub(super) fn contacts(
             let end = a.end(a_at, side);
             let apart = round_core::contact(&a.disc(), &end, b, b_at, reach);
             let apart = apart.filter(|p| p.normal.cross(&axis(a_at)).norm() > FLAT);
+            // The disc meets an edge that has sunk into the rim nowhere but in itself.
             let found = match apart {
-                Some(found) if found.gap > 0.0 => Some(found),
-                // The disc meets an edge that has sunk into the rim nowhere but in itself.
+                Some(found) if found.gap > 0.0 => vec![found],
                 other => {
                     let overlapping = other.filter(|p| p.gap < 0.0);
                     let overlapping = overlapping.map(|p| rim::shallow(p, depth));
-                    let edges = edges.iter();
-                    let sunk =
-                        edges.filter_map(|e| sunk(&Rim::new(a, a_at, side), e, b.radius, depth));
-                    (sunk.chain(overlapping)).max_by(|p, q| p.gap.total_cmp(&q.gap))
+                    let rim = Rim::new(a, a_at, side);
+                    let sunk = edges.iter().flat_map(|e| sunk(&rim, e, b.radius, depth));
+                    weight::in_turn(sunk.chain(overlapping).collect())
                 }
             };
-            out.extend(found.and_then(|p| rim::lowest(a_at, p)));
+            out.extend(found.into_iter().filter_map(|p| rim::lowest(a_at, p)));
         }
     }
     if !b.faces.is_empty() {
@@ -78,8 +78,13 @@ pub(super) fn contacts(
     let side = line(a, a_at);
     for edge in &edges {
         for end in SIDES {
-            let found = edge_over(edge, b.radius, &Rim::new(a, a_at, end), reach, depth);
+            let rim = Rim::new(a, a_at, end);
+            let found = edge_over(edge, b.radius, &rim, reach, depth);
             out.extend(found.into_iter().flatten().map(ContactPoint::swapped));
+            if edge.inward.is_none() {
+                let found = tangent_over(edge, [b.radius, 0.0], &rim, reach, depth);
+                out.extend(found.map(ContactPoint::swapped));
+            }
         }
         let radii = [a.radius, b.radius];
         out.extend(crossing(&side, edge, radii, a.radius, depth));

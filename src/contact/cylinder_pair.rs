@@ -6,18 +6,35 @@
 
 use super::core_core::{DEPTH, END, crossing};
 use super::cylinder::{line, thickness};
-use super::over_rim::{Rim, rim_over, side_over};
+use super::over_rim::{Rim, rim_over, side_over, tangent_over};
+use super::plane;
 use super::point::ContactPoint;
 use super::rim::{self, SIDES, axis};
 use super::round_core::{SLACK, on_edge};
-use super::sunk::WITHIN;
-use super::{plane, round_pair};
+use super::round_pair::{self, FARTHEST};
 use crate::geometry::HalfSpace;
-use crate::geometry::convex::{Cylinder, Disc, Edge, Ellipsoid, Round, common_normal};
+use crate::geometry::convex::{Cylinder, Disc, Edge, Ellipsoid, Round, Support, common_normal};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// Sine of the angle between a normal and a disc's axis below which they are the same to rounding.
 const FLAT: f64 = 1e-9;
+
+/// Parts of the thinner cylinder's thickness by which discs are drawn in to where they are apart.
+const DRAWN_IN: [f64; 4] = [0.25, 0.1, 0.02, 0.004];
+
+/// Outermost points, world frame.
+type Outermost<'a> = &'a dyn Fn(&Vec3) -> Support;
+
+/// The outermost point of a cylinder: of the end that the direction leads to.
+fn outermost(c: &Cylinder, at: &Pose, direction: &Vec3) -> Support {
+    let side = 1f64.copysign(direction.dot(&axis(at)));
+    c.disc().support(&c.end(at, side), direction)
+}
+
+/// How far a step may lead from a normal, rad: short of the axis, along which a disc's outermost points are many.
+fn short_of(normal: &Vec3, at: &Pose) -> f64 {
+    FARTHEST.min(0.7 * normal.cross(&axis(at)).norm())
+}
 
 /// All points of two cylinders with a gap below `reach`.
 pub(super) fn contacts(
@@ -37,10 +54,14 @@ pub(super) fn contacts(
     out.extend(crossing(&first, &second, radii, shell, depth));
     // A side that lies across an end, whose rims stand out on both sides.
     for side in SIDES {
-        let over = side_over(&first, a.radius, &Rim::new(b, b_at, side), reach, depth);
-        out.extend(over.into_iter().flatten());
-        let over = side_over(&second, b.radius, &Rim::new(a, a_at, side), reach, depth);
-        out.extend(over.into_iter().flatten().map(ContactPoint::swapped));
+        let over = |axis: &Edge, radius: f64, rim: &Rim| {
+            let crossing = side_over(axis, radius, rim, reach, depth);
+            let tangent = tangent_over(axis, [radius; 2], rim, reach, depth);
+            crossing.into_iter().chain([tangent]).flatten()
+        };
+        out.extend(over(&first, a.radius, &Rim::new(b, b_at, side)));
+        let theirs = over(&second, b.radius, &Rim::new(a, a_at, side));
+        out.extend(theirs.map(ContactPoint::swapped));
     }
     out.retain(|p| p.gap < reach && p.weight > 0.0);
     out
@@ -144,24 +165,34 @@ fn nearest(
             if (end.translation - there.translation).norm() - size >= reach {
                 continue;
             }
-            let within = 0.5 * WITHIN * thickness(a).min(thickness(b));
-            let normal = common_normal((&disc, &end), (&b.disc(), &there), size).or_else(|| {
-                let (first, first_at) = drawn_in(a, a_at, side, within);
-                let (second, second_at) = drawn_in(b, b_at, other, within);
-                common_normal((&first, &first_at), (&second, &second_at), size)
-            });
             let level = |n: &Vec3, at: &Pose| n.cross(&axis(at)).norm() <= FLAT;
-            let Some(normal) = normal.filter(|n| !level(n, a_at) && !level(n, b_at)) else {
-                continue;
+            let found = |normal: Vec3, first: Outermost, second: Outermost| {
+                let slanting = Some(normal).filter(|n| !level(n, a_at) && !level(n, b_at))?;
+                let most = |n: &Vec3| short_of(n, a_at).min(short_of(n, b_at));
+                let found = round_pair::contact(first, second, most, size, slanting).ok()?;
+                let out_of_b = found.normal.dot(&(other * axis(b_at)));
+                let into_a = found.normal.dot(&(side * axis(a_at)));
+                let faces = out_of_b >= -SLACK && (found.gap >= 0.0 || into_a <= SLACK);
+                faces.then_some(found)
             };
-            let pair = ((&disc, &end), (&b.disc(), &there));
-            let Ok(found) = round_pair::contact(pair.0, pair.1, size, normal) else {
-                continue;
+            let apart = common_normal((&disc, &end), (&b.disc(), &there), size);
+            let point = match apart {
+                Some(normal) => found(normal, &|n| disc.support(&end, n), &|n| {
+                    b.disc().support(&there, n)
+                }),
+                // From smaller ones further in, which are apart.
+                None => DRAWN_IN.into_iter().find_map(|part| {
+                    let within = part * thickness(a).min(thickness(b));
+                    let (first, first_at) = drawn_in(a, a_at, side, within);
+                    let (second, second_at) = drawn_in(b, b_at, other, within);
+                    let normal = common_normal((&first, &first_at), (&second, &second_at), size)?;
+                    found(normal, &|n| outermost(a, a_at, n), &|n| {
+                        outermost(b, b_at, n)
+                    })
+                }),
             };
-            let out_of_b = found.normal.dot(&(other * axis(b_at)));
-            let into_a = found.normal.dot(&(side * axis(a_at)));
-            if out_of_b >= -SLACK && (found.gap >= 0.0 || into_a <= SLACK) {
-                best.take(found);
+            if let Some(point) = point {
+                best.take(point);
             }
         }
     }
@@ -197,7 +228,7 @@ pub(super) fn ellipsoid(
                 continue;
             }
             let normal = common_normal((a, a_at), (&disc, &end), size).or_else(|| {
-                let (inner, there) = drawn_in(b, b_at, side, 0.5 * WITHIN * thickness(b));
+                let (inner, there) = drawn_in(b, b_at, side, DRAWN_IN[0] * thickness(b));
                 common_normal((a, a_at), (&inner, &there), size)
             });
             let normal = normal.unwrap_or_else(|| {
@@ -206,7 +237,10 @@ pub(super) fn ellipsoid(
             if normal.cross(&axis(b_at)).norm() <= FLAT {
                 continue;
             }
-            if let Ok(found) = round_pair::contact((a, a_at), (&disc, &end), size, normal)
+            let first = |n: &Vec3| a.support(a_at, n);
+            let second = |n: &Vec3| disc.support(&end, n);
+            if let Ok(found) =
+                round_pair::contact(first, second, |n| short_of(n, b_at), size, normal)
                 && found.normal.dot(&(side * axis(b_at))) >= -SLACK
             {
                 best.take(found);

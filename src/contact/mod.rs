@@ -4,7 +4,7 @@
 //! corners, with a radius about it: a ball is a corner, a capsule an edge, a box a polyhedron of radius zero.
 //!
 //! - An ellipsoid and anything else: one point, that of their common normal, which
-//!   follows the faces, edges and corners of the other without a jump.
+//!   follows the faces, edges and corners of the other without a jump, overlapping too, but where two ways apart are equally short.
 //! - Core and core: every corner of either against the signed distance of the other, and every
 //!   edge against every edge where the two cross. Faces that lie on one another thus get several
 //!   points. A ball has nothing but its centre and so gets one.
@@ -29,8 +29,10 @@
 //!
 //! The nearest point of a rim jumps to the other side as the normal tips past the cylinder's axis. Below a sine of [`TILT`]
 //! between the two it fades out, with the square of that at last, and the [`RIM_POINTS`] in place fade in. An edge that has sunk
-//! into a rim and is parallel to it has no point.
+//! into a rim and is parallel to it has no point; the axis of a capsule or a cylinder that passes over a rim along its tangent
+//! has one of its own.
 
+mod arc;
 mod core_core;
 mod cylinder;
 mod cylinder_pair;

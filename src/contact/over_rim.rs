@@ -9,8 +9,8 @@ use super::core_core::{DEPTH_RAMP, END, LEAVE};
 use super::point::{ContactPoint, Rows3, carry, rotate};
 use super::rim::{TILT, sine};
 use super::weight::Weight;
-use crate::geometry::convex::{Cylinder, Edge, Field, across};
-use hydrograd_adjoint::lie::{Pose, Vec3, Vec6};
+use crate::geometry::convex::{Cylinder, Disc, Edge, Field, Round, across, perpendicular};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6};
 
 /// Rounds of Newton's method for a point over two rims.
 const ROUNDS: usize = 20;
@@ -18,6 +18,9 @@ const ROUNDS: usize = 20;
 /// Square of the sine of the angle between a curve and the rim below which the point where it comes over fades. It goes with the
 /// way that the curve still has to the rim's outermost point.
 const ALONG: f64 = 0.1;
+
+/// Share of its radius that an axis is still over an end where it has faded.
+const SUNK: f64 = 0.2;
 
 /// The rim of a cylinder's end, world frame.
 pub(super) struct Rim {
@@ -35,6 +38,13 @@ impl Rim {
             out: side * at.rotation.column(2),
             radius: cylinder.radius,
         }
+    }
+
+    /// That of its disc: z leads out.
+    pub fn frame(&self) -> Pose {
+        let u = perpendicular(&self.out);
+        let v = self.out.cross(&u);
+        Pose::new(Mat3::from_columns(&[u, v, self.out]), self.center)
     }
 }
 
@@ -98,7 +108,71 @@ pub(super) fn edge_over(
     line_over((edge, carry), radius, rim, reach, depth)
 }
 
-/// The same of a cylinder's side about this axis: of the line on it that is lowest over the end.
+/// The point of a straight axis with a radius about it that is nearest to the cylinder's own axis, in the distance of the end. Where the axis passes level
+/// over the rim along its tangent, the points above have faded and the nearest point of the rim isn't one yet; this one
+/// has the weight that they lack. `shell` is what of the radius counts as overlap.
+pub(super) fn tangent_over(
+    axis: &Edge,
+    [radius, shell]: [f64; 2],
+    rim: &Rim,
+    reach: f64,
+    depth: f64,
+) -> Option<ContactPoint> {
+    let lean = axis.along.dot(&rim.out);
+    if lean.abs() >= TILT {
+        return None;
+    }
+    let flat = across(&rim.out);
+    let (start, step) = (flat * (axis.from - rim.center), flat * axis.along);
+    let square = step.norm_squared();
+    let s = -start.dot(&step) / square;
+    let ends = [s, axis.length - s];
+    let x = axis.from + s * axis.along;
+    let height = rim.out.dot(&(x - rim.center));
+    if height <= 0.0 || ends.iter().any(|x| *x <= 0.0) {
+        return None;
+    }
+    // It slides so that q · e stays zero, q from the cylinder's axis.
+    let q = start + s * step;
+    let turned = rotate(&axis.along);
+    let slid = -(carry(&x).tr_mul(&step) + turned.tr_mul(&q)) / square;
+    let motion: Rows3 = carry(&x) + axis.along * slid.transpose();
+    let disc = Disc { radius: rim.radius };
+    let frame = rim.frame();
+    let field = disc
+        .field(&frame.apply_inverse(&x))
+        .rotated(&frame.rotation);
+    let point = ContactPoint::probe(&x, &motion, [radius, 0.0], &field);
+    if point.gap >= reach {
+        return None;
+    }
+    let mut weight = Weight::full();
+    let through = 1.0 - q.norm_squared() / (rim.radius * rim.radius);
+    let slope = motion.tr_mul(&q) * (-2.0 / (rim.radius * rim.radius * ALONG));
+    weight.fade_out(through / ALONG, &slope);
+    let (sine, slope) = sine(
+        (&point.normal, &point.slopes.normal),
+        (&rim.out, &Rows3::zeros()),
+    );
+    weight.fade_out(sine / TILT, &(slope / TILT));
+    let slope = turned.tr_mul(&rim.out) * lean.signum();
+    weight.fade_out(lean.abs() / TILT, &(slope / TILT));
+    if depth.is_finite() {
+        let ramp = DEPTH_RAMP * depth;
+        let above = point.gap + radius - shell;
+        weight.fade((above + depth) / ramp, &(point.slopes.gap / ramp));
+    }
+    // Gone before the axis is at the end itself, beyond which it has sunk in.
+    let slope = motion.tr_mul(&rim.out);
+    weight.fade(height / (SUNK * radius), &(slope / (SUNK * radius)));
+    let width = END * axis.length.min(rim.radius);
+    for (x, slope) in ends.iter().zip([slid, -slid]) {
+        weight.fade(x / width, &(slope / width));
+    }
+    weighed(point, &weight)
+}
+
+/// Where a cylinder's side about this axis comes over the rim and leaves it: of the line on it that is lowest over the end.
 pub(super) fn side_over(
     axis: &Edge,
     radius: f64,

@@ -11,17 +11,18 @@
 //! A disc is an ellipsoid without height. Where the normal is its axis, it has no outermost point of its own, and whoever
 //! asks must look at that.
 
+use super::arc::Arc;
 use super::plane;
 use super::point::{ContactPoint, Rows3, carry, rotate};
+use super::round_pair::{self, FARTHEST};
 use crate::geometry::HalfSpace;
-use crate::geometry::convex::{Core, Edge, Face, Round};
-use hydrograd_adjoint::lie::{Pose, Vec3};
+use crate::geometry::convex::{Core, Edge, Face, Round, Support};
+use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
 /// Room for rounding where a feature hands over to the next.
 pub(super) const SLACK: f64 = 1e-9;
 
-/// The point of contact if its gap is below `reach`; the ellipsoid or disc is the first body. Deep inside,
-/// where no feature has a common normal, it is that of the face with the least overlap.
+/// The point of contact if its gap is below `reach`; the ellipsoid or disc is the first body. A disc has none with an edge that pierces it.
 pub(super) fn contact<R: Round>(
     round: &R,
     round_at: &Pose,
@@ -35,21 +36,14 @@ pub(super) fn contact<R: Round>(
             *best = Some(found);
         }
     };
-    let mut highest: Option<ContactPoint> = None;
     for face in &core.faces {
-        let normal = core_at.rotation * face.normal;
-        let plane = HalfSpace {
-            point: core_at.apply(&(face.offset * face.normal)),
-            normal,
-        };
-        let found = plane::lowest(round, round_at, &plane);
+        let found = over_face(round, round_at, face, core_at);
         let foot = core_at.apply_inverse(&found.position);
         if face.is_below(&foot, SLACK * core.diameter())
             && (R::HAS_INSIDE || found.gap >= 0.0 || within(core, core_at, &found))
         {
-            take(&mut best, found.clone());
+            take(&mut best, found);
         }
-        take(&mut highest, found);
     }
     // Apart, and so the nearest of all.
     if best.as_ref().is_some_and(|b| b.gap >= 0.0) {
@@ -94,10 +88,68 @@ pub(super) fn contact<R: Round>(
             }
         }
     }
-    if best.is_none() && pierced && R::HAS_INSIDE {
-        best = highest;
+    if R::HAS_INSIDE && (pierced || best.as_ref().is_some_and(|b| b.gap < 0.0)) {
+        best = overlapping(round, round_at, core, core_at);
     }
     best.filter(|b| b.gap < reach)
+}
+
+/// The point of contact of an ellipsoid and a core that overlap: that of the largest f of all faces, tops between the normals of edges, and corners. The lowest
+/// places of edges don't do: an edge that passes through the middle of the ellipsoid is lowest there, on which side is rounding.
+fn overlapping<R: Round>(
+    round: &R,
+    round_at: &Pose,
+    core: &Core,
+    core_at: &Pose,
+) -> Option<ContactPoint> {
+    let support = |n: &Vec3| round.support(round_at, n);
+    let on_face = core
+        .faces
+        .iter()
+        .map(|f| over_face(round, round_at, f, core_at));
+    let on_edge = core.edges.iter().flat_map(|edge| {
+        let edge = edge.placed(core_at);
+        let arc = Arc::of(&edge, 0.0);
+        let tops = arc.tops(support).into_iter();
+        tops.map(|top| arc.contact(&top, core.radius))
+            .collect::<Vec<_>>()
+    });
+    let on_corner = core
+        .corners
+        .iter()
+        .zip(&core.spokes)
+        .filter_map(|(corner, spokes)| {
+            let x = core_at.apply(corner);
+            let ways: Vec<Vec3> = spokes.iter().map(|d| core_at.rotation * d).collect();
+            let inward = |p: &ContactPoint| ways.iter().all(|d| p.normal.dot(d) <= SLACK);
+            let nearest = seen(round, round_at, &x, &carry(&x), core.radius).swapped();
+            if inward(&nearest) {
+                return Some(nearest);
+            }
+            // Past the middle of the ellipsoid the nearest side isn't that by which the corner came.
+            if core.faces.is_empty() || nearest.gap >= 0.0 {
+                return None;
+            }
+            let out = -ways.iter().sum::<Vec3>().try_normalize(0.0)?;
+            let fixed = |_: &Vec3| Support {
+                point: x,
+                spread: Mat3::zeros(),
+            };
+            let found =
+                round_pair::contact(support, fixed, |_| FARTHEST, core.diameter(), out).ok()?;
+            inward(&found).then_some(found)
+        });
+    let all = on_face.chain(on_edge).chain(on_corner);
+    all.max_by(|p, q| p.gap.total_cmp(&q.gap))
+}
+
+/// The lowest point over a face.
+fn over_face(round: &impl Round, round_at: &Pose, face: &Face, core_at: &Pose) -> ContactPoint {
+    let plane = HalfSpace {
+        point: core_at.apply(&(face.offset * face.normal)),
+        normal: core_at.rotation * face.normal,
+    };
+    plane::lowest(round, round_at, &plane)
 }
 
 /// Whether the first body's point of a contact lies within a core: not beyond it, under a face that it is far below.

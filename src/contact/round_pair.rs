@@ -12,7 +12,7 @@
 
 use super::point::{ContactPoint, Slopes, carry, columns};
 use crate::error::{Error, Result};
-use crate::geometry::convex::{Ellipsoid, Round, perpendicular};
+use crate::geometry::convex::{Ellipsoid, Round, Support, perpendicular};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, Vec6, skew};
 use nalgebra::{Matrix2, Matrix3x2, SymmetricEigen, Vector2};
 
@@ -22,6 +22,8 @@ const BISECTIONS: usize = 40;
 /// no better.
 const TIGHT: f64 = 1e-15;
 const ENOUGH: f64 = 1e-10;
+/// Longest step, rad.
+pub(super) const FARTHEST: f64 = 0.5;
 /// Least curvature of f at its top, in sizes: concentric balls have none.
 const FLOOR: f64 = 1e-9;
 
@@ -47,22 +49,25 @@ pub(super) fn ellipsoids(
 ) -> Result<ContactPoint> {
     let size = first.semi_axes.max() + second.semi_axes.max();
     let normal = start(first, first_at, second, second_at);
-    contact((first, first_at), (second, second_at), size, normal)
+    let first = |n: &Vec3| first.support(first_at, n);
+    let second = |n: &Vec3| second.support(second_at, n);
+    contact(first, second, |_| FARTHEST, size, normal)
 }
 
-/// The point of contact of two bodies of this size together (m), with a normal near `normal`.
+/// The point of contact of two bodies by their outermost points (world frame) and their size together (m), with a normal near `normal`. `most` is how far a step may
+/// lead from a normal, rad: not past one where f has a kink.
 ///
 /// # Errors
 /// [`Error::Solver`] if the common normal isn't found.
 pub(super) fn contact(
-    (first, first_at): (&impl Round, &Pose),
-    (second, second_at): (&impl Round, &Pose),
+    first: impl Fn(&Vec3) -> Support,
+    second: impl Fn(&Vec3) -> Support,
+    most: impl Fn(&Vec3) -> f64,
     size: f64,
     mut normal: Vec3,
 ) -> Result<ContactPoint> {
     let height = |n: &Vec3| {
-        let a = first.support(first_at, &-n);
-        let b = second.support(second_at, n);
+        let (a, b) = (first(&-n), second(n));
         let gradient = a.point - b.point;
         Height {
             value: gradient.dot(n),
@@ -94,8 +99,9 @@ pub(super) fn contact(
             step += 0.1 * top.eigenvectors.column(top.eigenvalues.imin());
         }
         let length = step.norm();
-        if length > 0.5 {
-            step *= 0.5 / length;
+        let most = most(&normal);
+        if length > most {
+            step *= most / length;
         }
         let mut risen = None;
         for halving in 0..50 {

@@ -3,68 +3,49 @@
 //! At the angle θ of the rim, with tangent t, and y the vector to x(θ) from the edge's line with unit vector e, the common normal is
 //! n = ± t × e/|t × e| where y · (t − e (e · t)) = 0: stationary, and so also where the two touch and overlap.
 
+use super::arc::{Arc, Top};
 use super::core_core::{DEPTH_RAMP, END, LEAVE, PARALLEL};
 use super::over_rim::Rim;
 use super::point::{ContactPoint, Rows3, Slopes, carry, rotate};
 use super::weight::Weight;
-use crate::geometry::convex::{Disc, Edge, Round, across, perpendicular};
-use hydrograd_adjoint::lie::{Mat3, Pose, Vec3, skew};
+use crate::geometry::convex::{Disc, Edge, Round, across};
+use hydrograd_adjoint::lie::{Vec3, skew};
 
-/// Rounds of Newton's method.
-const ROUNDS: usize = 30;
+/// Angle beyond the normals of an edge at which tops are looked for, rad: more than the weight reaches.
+const ROOM: f64 = 1.2 * LEAVE;
 /// Sine of the angle to the axis below which a direction leads to no place of the rim.
 const FLAT: f64 = 1e-6;
-/// Part of the cylinder's least half width by which a smaller one lies within it: that is apart from what has sunk in less.
-pub(super) const WITHIN: f64 = 0.5;
 
-/// The overlap, the cylinder with the rim being the first body; none where there is none, or it has faded out. `depth` is that
+/// The overlaps, the cylinder with the rim being the first body; none where there is none, or it has faded out. `depth` is that
 /// at which an overlap has faded out.
-pub(super) fn sunk(rim: &Rim, edge: &Edge, radius: f64, depth: f64) -> Option<ContactPoint> {
-    // Seen from a smaller disc further in, which the edge hasn't reached.
-    let within = WITHIN * depth.min(rim.radius);
-    let disc = Disc {
-        radius: rim.radius - within,
-    };
-    let u = perpendicular(&rim.out);
-    let v = rim.out.cross(&u);
-    let frame = Pose::new(
-        Mat3::from_columns(&[u, v, rim.out]),
-        rim.center - within * rim.out,
-    );
+pub(super) fn sunk(rim: &Rim, edge: &Edge, radius: f64, depth: f64) -> Vec<ContactPoint> {
+    let frame = rim.frame();
     let (from, along) = (
         frame.apply_inverse(&edge.from),
         frame.rotation.tr_mul(&edge.along),
     );
-    let s = disc.lowest(&from, &along, edge.length)?;
-    let field = disc.field(&(from + s * along));
-    let aside = field.gradient.xy();
-    if aside.norm() <= FLAT {
-        return None;
+    // All of it over the end, or beside the cylinder.
+    let flat = along.xy();
+    let aside = from.xy().perp(&flat).abs() / flat.norm();
+    if from.z.min(from.z + edge.length * along.z) >= 0.0 || aside >= rim.radius {
+        return Vec::new();
     }
-    let mut angle = aside.y.atan2(aside.x);
+    let disc = Disc { radius: rim.radius };
+    let tops = Arc::of(edge, ROOM).tops(|n| disc.support(&frame, n));
+    let at = |top: Top| {
+        let out = -(across(&rim.out) * top.normal).try_normalize(FLAT)?;
+        overlap(rim, edge, &out, radius, depth)
+    };
+    tops.into_iter().filter_map(at).collect()
+}
+
+/// That where the rim leads `out` from the axis.
+fn overlap(rim: &Rim, edge: &Edge, out: &Vec3, radius: f64, depth: f64) -> Option<ContactPoint> {
+    let (out, tangent) = (*out, rim.out.cross(out));
+    let y = rim.center + rim.radius * out - edge.from;
     let line = across(&edge.along);
-    let place = |angle: f64| {
-        let (sin, cos) = angle.sin_cos();
-        let (out, tangent) = (cos * u + sin * v, cos * v - sin * u);
-        let y = rim.center + rim.radius * out - edge.from;
-        (out, tangent, y)
-    };
-    let steepness = |(out, tangent, y): &(Vec3, Vec3, Vec3)| {
-        rim.radius * (line * tangent).norm_squared() - (line * y).dot(out)
-    };
-    let mut left = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let at = place(angle);
-        left = (line * at.2).dot(&at.1) / steepness(&at);
-        angle -= left;
-        if left.abs() <= 1e-15 || left.is_nan() {
-            break;
-        }
-    }
-    let at = place(angle);
-    let slope = steepness(&at);
-    let (out, tangent, y) = at;
-    if left.is_nan() || left.abs() > 1e-9 || slope <= 0.0 {
+    let slope = rim.radius * (line * tangent).norm_squared() - (line * y).dot(&out);
+    if slope <= 0.0 {
         return None;
     }
     let cross = tangent.cross(&edge.along);

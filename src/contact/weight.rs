@@ -1,5 +1,6 @@
 //! Weights by which points of contact come and go.
 
+use super::point::ContactPoint;
 use hydrograd_adjoint::lie::Vec6;
 
 /// A weight with its slope; a product of such.
@@ -31,4 +32,21 @@ impl Weight {
     pub fn fade_out(&mut self, x: f64, slope: &Vec6) {
         self.fade(1.0 - x, &-slope);
     }
+}
+
+/// Points of which one is meant: that with the largest gap, and the next as far as those before it have faded.
+pub(super) fn in_turn(mut points: Vec<ContactPoint>) -> Vec<ContactPoint> {
+    points.sort_by(|p, q| q.gap.total_cmp(&p.gap));
+    let mut left = Weight::full();
+    for point in &mut points {
+        let Weight { value, slope } = left;
+        left = Weight {
+            value: value * (1.0 - point.weight),
+            slope: slope * (1.0 - point.weight) - value * point.slopes.weight,
+        };
+        point.slopes.weight = value * point.slopes.weight + point.weight * slope;
+        point.weight *= value;
+    }
+    points.retain(|p| p.weight > 0.0);
+    points
 }

@@ -1,11 +1,14 @@
 //! Circular cylinders and the discs at their ends: support points and signed distances.
 
 use super::field::{AtCorner, Field, across, leaves, perpendicular};
-use super::round::{Approach, Round, Support};
+use super::round::{Approach, Round, Support, lowest};
 use hydrograd_adjoint::lie::{Mat3, Pose, Vec3};
 
 /// Share of a radius below which a distance is rounding.
 const ROUNDING: f64 = 1e-13;
+
+/// Share of an edge's size within which its lowest place over a disc is one at which it pierces that.
+const PIERCED: f64 = 1e-12;
 
 /// A disc across z about the origin.
 #[derive(Clone, Copy, Debug)]
@@ -134,6 +137,16 @@ impl Round for Disc {
 
     fn least(&self, x: &Vec3) -> f64 {
         x.norm() - self.radius
+    }
+
+    /// None of an edge that pierces the disc: what is lowest there is in it, and on which side is rounding.
+    fn lowest(&self, from: &Vec3, along: &Vec3, length: f64) -> Option<f64> {
+        let first = self.approach(from, along, length).at;
+        let s = lowest(&|x| self.field(x), from, along, length, first)?;
+        let x = from + s * along;
+        let pierced =
+            x.x.hypot(x.y) <= self.radius && x.z.abs() <= PIERCED * (length + from.amax());
+        (!pierced).then_some(s)
     }
 }
 

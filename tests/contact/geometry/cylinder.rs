@@ -9,7 +9,7 @@ use hydrograd::shape::solid;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 /// Least gap of all points that count.
-fn least(points: &[ContactPoint]) -> f64 {
+pub(super) fn least(points: &[ContactPoint]) -> f64 {
     let counted = points.iter().filter(|p| p.weight > 0.0);
     counted.map(|p| p.gap).fold(f64::INFINITY, f64::min)
 }
@@ -19,7 +19,7 @@ fn floor() -> HalfSpace {
 }
 
 /// The distance by formula.
-fn distance(a: &Shape, a_at: &Pose, b: &Shape, b_at: &Pose) -> f64 {
+pub(super) fn distance(a: &Shape, a_at: &Pose, b: &Shape, b_at: &Pose) -> f64 {
     let mesh = |s: &Shape| build(s, Path::new("."), Some(80)).unwrap();
     let exact = |s: &Shape| solid(s, Pose::identity()).unwrap();
     let (first, second) = (mesh(a), mesh(b));

@@ -8,6 +8,7 @@ mod known;
 mod neighbours;
 mod slopes;
 mod smooth;
+mod sunk;
 
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, point_velocity};
 use hydrograd::adjoint::sample::Samples;

@@ -2,7 +2,8 @@
 
 use super::fluid::{self, FluidMomenta};
 use super::island_matrix::IslandMatrix;
-use super::recoil::Recoiling;
+use super::recoil::{Own, Recoiling};
+use super::tied::{Places, Tied};
 use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
 use crate::adjoint::rigid;
@@ -102,8 +103,11 @@ impl<'a> Evaluation<'a> {
             FluidMomenta::Apart(added) => Some(*added),
             FluidMomenta::Still => None,
             FluidMomenta::Scattered(at) => {
-                let own = self.factored_apart(free, Some(at.own()))?;
-                let own = Box::new(move |right: &DVector<f64>| own.solve(right));
+                let alone = self.factored_apart(free, Some(at.own()))?;
+                let own = match self.factored_filmed(free) {
+                    Some(own) => own,
+                    None => Own::new(false, move |right: &DVector<f64>| alone.solve(right)),
+                };
                 return Ok(Inertia::Recoiling(Recoiling::new(self, at, own)));
             }
         };
@@ -186,6 +190,26 @@ impl<'a> Evaluation<'a> {
             factors.push((rows, factor));
         }
         Ok(Factor::Blocks(factors))
+    }
+
+    /// That of many bodies which the films between them weigh upon; none where there are no films.
+    fn factored_filmed(&self, free: &[usize]) -> Option<Own<'a>> {
+        if !self.has_films() {
+            return None;
+        }
+        let velocities = self.system.tree.velocities();
+        let mut matrix = Tied::new(self.mass_blocks(), velocities, free);
+        self.film_masses(|i, j, x| matrix.add(i, j, x));
+        let factor = matrix.factor(&mut Places::default())?;
+        let free = free.to_vec();
+        Some(Own::new(true, move |right: &DVector<f64>| {
+            let found = factor.solve(&right.select_rows(&free));
+            let mut out = DVector::zeros(right.len());
+            for (i, x) in free.iter().zip(found.iter()) {
+                out[*i] = *x;
+            }
+            out
+        }))
     }
 
     /// The factor of trees of joints, of bodies with these added masses.

@@ -37,6 +37,7 @@ mod slopes;
 mod stiffness;
 mod symmetry;
 mod system;
+mod tied;
 mod ties;
 mod tree_motions;
 

@@ -7,7 +7,7 @@
 use super::Evaluation;
 use crate::adjoint::lie::{Mat6, Vec6};
 use crate::coupling::Carried;
-use crate::coupling::scattering::{Goal, Recoiled, Scattered};
+use crate::coupling::scattering::{self, Goal, Recoiled, Scattered};
 use nalgebra::DVector;
 use std::sync::Arc;
 
@@ -17,7 +17,25 @@ const LEAST: f64 = 1e-6;
 const CHANGE: f64 = 0.05;
 
 /// v with M₀ v = the impulses given on the free velocities, and zero on driven ones.
-pub(super) type Own<'a> = Box<dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync + 'a>;
+type Solve<'a> = Box<dyn Fn(&DVector<f64>) -> DVector<f64> + Send + Sync + 'a>;
+
+/// The inertia that recoils.
+pub(super) struct Own<'a> {
+    solve: Solve<'a>,
+    /// Whether M₀ has what films between the bodies weigh, which is much more than the bodies where surfaces are near.
+    films: bool,
+}
+
+impl<'a> Own<'a> {
+    /// By what solves with it.
+    pub fn new(
+        films: bool,
+        solve: impl Fn(&DVector<f64>) -> DVector<f64> + Send + Sync + 'a,
+    ) -> Self {
+        let solve = Box::new(solve);
+        Self { solve, films }
+    }
+}
 
 /// The factor of M(q), free rows and columns, of many bodies.
 pub struct Recoiling<'a> {
@@ -67,7 +85,17 @@ impl<'a> Recoiling<'a> {
         if self.current {
             all = all.rows(0, all.len() - 1).into_owned();
         }
-        (self.own)(&(self.density * all))
+        (self.own.solve)(&(self.density * all))
+    }
+
+    /// What bodies recoil with, from a first velocity and to a residual.
+    fn found(&self, start: &DVector<f64>, behind: Option<&[f64]>, goal: Goal) -> Recoiled {
+        let own = scattering::Own {
+            scale: &self.scale,
+            recoil: &|h| self.twists(&self.answered(h)),
+            films: self.own.films,
+        };
+        self.at.recoil(start, behind, &own, goal)
     }
 
     /// v with M v = `right` on the free rows; driven ones rest.
@@ -77,7 +105,13 @@ impl<'a> Recoiling<'a> {
 
     /// v with given velocities `driven` (zero where free), and M v = `right` + M₀ `driven` on the free rows.
     pub fn solve_beside(&self, right: &DVector<f64>, driven: &DVector<f64>) -> DVector<f64> {
-        let first = driven + (self.own)(right);
+        let mut first = driven + (self.own.solve)(right);
+        if self.own.films && driven.iter().any(|x| *x != 0.0) {
+            let twists = self.twists(driven);
+            let mut impulses = DVector::zeros(twists.len());
+            self.at.add_films(&twists, &mut impulses);
+            first -= self.answered(&impulses);
+        }
         let (v, found) = self.recoiled(first, None, Goal::Full);
         self.at.settle(self.twists(&v), found);
         v
@@ -88,7 +122,7 @@ impl<'a> Recoiling<'a> {
         let goal = of.map_or(Goal::Full, |v| {
             Goal::Absolute(CHANGE * self.at.levels().tolerance * self.size(v))
         });
-        let (v, found) = self.recoiled((self.own)(right), None, goal);
+        let (v, found) = self.recoiled((self.own.solve)(right), None, goal);
         self.at.remember(found);
         v
     }
@@ -102,7 +136,7 @@ impl<'a> Recoiling<'a> {
         goal: f64,
     ) -> (DVector<f64>, Vec<f64>) {
         let behind = Some(behind).filter(|b| !b.is_empty());
-        let (v, found) = self.recoiled((self.own)(right), behind, Goal::Relative(goal));
+        let (v, found) = self.recoiled((self.own.solve)(right), behind, Goal::Relative(goal));
         (v, found.left)
     }
 
@@ -126,11 +160,13 @@ impl<'a> Recoiling<'a> {
         let displaced = at.displaced(&at.motions().twists(direction), z);
         let (asked, mut impulses) = displaced.asked();
         at.add_own(twists, &mut impulses);
-        let first = (self.own)(right) + self.answered(&impulses);
-        let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
+        if self.own.films {
+            at.add_films(twists, &mut impulses);
+        }
+        let first = (self.own.solve)(right) + self.answered(&impulses);
         let start = twists - self.twists(&first);
-        let found = at.recoil(&start, Some(&asked), &self.scale, recoil, Goal::Full);
-        let w = first + self.answered(&found.exchanged);
+        let found = self.found(&start, Some(&asked), Goal::Full);
+        let w = first + self.answered(&found.recoiling);
         let carried = displaced.carried(&(twists - self.twists(&w)), &found);
         (w, carried)
     }
@@ -141,8 +177,7 @@ impl<'a> Recoiling<'a> {
         behind: Option<&[f64]>,
         goal: Goal,
     ) -> (DVector<f64>, Recoiled) {
-        let recoil = |h: &DVector<f64>| self.twists(&self.answered(h));
-        let found = (self.at).recoil(&self.twists(&first), behind, &self.scale, recoil, goal);
-        (first - self.answered(&found.exchanged), found)
+        let found = self.found(&self.twists(&first), behind, goal);
+        (first - self.answered(&found.recoiling), found)
     }
 }

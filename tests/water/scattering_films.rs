@@ -331,3 +331,40 @@ fn pressed_together_the_gap_is_a_film() {
     assert_eq!(format!("{:?}", a.carried), "Film");
     assert_eq!(products.gap_report().changes, factor.gap_report().changes);
 }
+
+/// Blocks that lie on one another a millimetre apart, over a bed, and slide and sink.
+fn stack(blocks: usize) -> Simulator {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.add_wall([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+    scene.gravity = [0.0, 0.0, -9.81];
+    for k in 0..blocks {
+        let shape = Shape::cuboid([0.2, 0.2, 0.05]).faces(300);
+        let body = Body::new(shape).density(2000.0);
+        let at = [0.001 * (k % 3) as f64, 0.0, 0.026 + 0.051 * k as f64];
+        scene.add(body.at(at).named(format!("block {k}")));
+    }
+    let settings = settings(Exchange::Products, true).integrator(Integrator::Rk2);
+    Simulator::new(&scene, settings.time_step(0.001)).unwrap()
+}
+
+/// Films weigh ten times what the blocks do, each in its own gap: taken with the blocks' own inertia they don't lengthen the search, whose iterations grew with their number.
+#[test]
+fn films_weigh_with_the_bodies() {
+    let mut iterations = Vec::new();
+    for blocks in [8, 24] {
+        let simulator = stack(blocks);
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 5)).unwrap();
+        let summary = rollout.summary();
+        let drift = summary.momentum_drift.expect("nothing acts along the bed");
+        println!(
+            "{blocks} blocks: {} iterations, momentum changes by {drift:.1e}",
+            summary.iterations
+        );
+        assert!(drift < 1e-12);
+        iterations.push(summary.iterations);
+    }
+    assert!(
+        iterations.iter().all(|i| *i < 50),
+        "{iterations:?}: 35 and 36 are right, and 44 and 93 were needed for bodies alone"
+    );
+}

@@ -40,8 +40,12 @@ const UNRESOLVED: &str = "bodies are nearer than their compressed sources resolv
 pub struct Recoiled {
     /// Impulses that others exchange with each body, body frames, unit density.
     pub exchanged: DVector<f64>,
+    /// Those of them that bodies recoil from: not those of films that move with them ([`Own::films`]).
+    pub recoiling: DVector<f64>,
     /// What is left of the system's equations: of the modes, then of the twists, in units of about the root of their energy.
     pub left: Vec<f64>,
+    /// Whether there are others.
+    films: bool,
     /// Body-frame twists.
     twists: DVector<f64>,
     modes: Vec<f64>,
@@ -65,6 +69,17 @@ impl Recoiled {
             left: self.lacked,
         }
     }
+}
+
+/// How bodies recoil by themselves.
+#[derive(Clone, Copy)]
+pub struct Own<'r> {
+    /// About the root of the inertia of each body-frame twist, at unit density.
+    pub scale: &'r DVector<f64>,
+    /// What impulses (body frames, unit density) change of the twists: linear.
+    pub recoil: &'r dyn Fn(&DVector<f64>) -> DVector<f64>,
+    /// Whether the inertia that recoils has what films weigh.
+    pub films: bool,
 }
 
 /// The residual at which a solve ends, in units of about the root of an energy.
@@ -391,24 +406,28 @@ impl Scattered<'_> {
         self.kept().near = Some(Near { twists, modes });
     }
 
-    /// What the bodies are where impulses are given: their twists (body frames) are `first` − `recoil`(the impulses that others exchange with each, at unit density),
-    /// `recoil` linear and `scale` about the root of each twist's inertia at unit density. One system with one right-hand side, to which `behind` is added if there is any,
+    /// What the bodies are where impulses are given: their twists (body frames) are `first` less what they recoil from the impulses that others exchange with each.
+    /// One system with one right-hand side, to which `behind` is added if there is any,
     /// of the modes or of modes and twists, in the units of [`Recoiled::left`]: what was left of an earlier one, or what else the modes see.
     pub fn recoil(
         &self,
         first: &DVector<f64>,
         behind: Option<&[f64]>,
-        scale: &DVector<f64>,
-        recoil: impl Fn(&DVector<f64>) -> DVector<f64>,
+        own: &Own<'_>,
         goal: Goal,
     ) -> Recoiled {
         let (m, n) = (self.model.mode_count(), first.len());
         let unit = FLUX.sqrt();
         let sums = self.making();
+        let Own { scale, recoil, .. } = own;
+        let exchanged = |twists: &DVector<f64>, modes: &[f64]| match own.films {
+            true => self.exchanged_beside_films(&sums, twists, modes),
+            false => self.exchanged(&sums, twists, modes),
+        };
         // Modes and twists in units of about the root of their energy.
         let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
         let twists = |x: &[f64]| DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
-        let seen = |x: &[f64]| self.exchanged(&sums, &twists(x), &modes(x));
+        let seen = |x: &[f64]| exchanged(&twists(x), &modes(x));
         let next = |modes: &[f64], impulses: &DVector<f64>| -> Vec<f64> {
             let twists = recoil(impulses);
             let modes = modes.iter().map(|a| unit * a);
@@ -428,7 +447,7 @@ impl Scattered<'_> {
         };
         let near = self.kept().near.take();
         let near = near.and_then(|Near { twists, modes }| {
-            let (own, moved) = self.exchanged(&sums, &twists, &modes);
+            let (own, moved) = exchanged(&twists, &modes);
             let modes = modes.iter().map(|a| unit * a);
             let twists = twists.iter().zip(scale.iter()).map(|(t, s)| t * s);
             let x: Vec<f64> = modes.chain(twists).collect();
@@ -453,18 +472,29 @@ impl Scattered<'_> {
             }
         };
         let left = plus(&plus(&start, 1.0, &next(&seen, &impulses)), -1.0, &x);
-        let modes = modes(&x);
+        let (modes, twists) = (modes(&x), twists(&x));
+        let mut all = impulses.clone();
+        if own.films {
+            self.add_films(&twists, &mut all);
+        }
         Recoiled {
             lacked: plus(&modes, -1.0, &seen),
-            exchanged: impulses,
+            exchanged: all,
+            recoiling: impulses,
+            films: own.films,
             left,
-            twists: twists(&x),
+            twists,
             modes,
         }
     }
 
     /// Keeps what recoiled as the answer to the twists that follow from it.
-    pub fn settle(&self, twists: DVector<f64>, recoiled: Recoiled) -> Arc<Answer> {
+    pub fn settle(&self, twists: DVector<f64>, mut recoiled: Recoiled) -> Arc<Answer> {
+        // Films pull on what the twists became, or momentum would be lost by what the search leaves times what they weigh.
+        if recoiled.films {
+            recoiled.exchanged.copy_from(&recoiled.recoiling);
+            self.add_films(&twists, &mut recoiled.exchanged);
+        }
         let told = recoiled.told(twists);
         self.look(&told);
         self.keep(told)

@@ -41,7 +41,7 @@ mod spare;
 mod sums;
 mod surface;
 
-pub use answers::{Goal, Recoiled};
+pub use answers::{Goal, Own, Recoiled};
 pub use elsewhere::{Changed, Summing, SummingAt};
 pub use kept::{Answer, Told};
 pub use levels::{Apart, Levels};

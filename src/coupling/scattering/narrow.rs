@@ -117,7 +117,14 @@ impl<'a> Narrow<'a> {
         !self.gaps.is_empty()
     }
 
-    /// Adds to what modes and twists see of each other's charges and films, of the twists as impulses.
+    /// The bodies of each film and its impulses to their twists, body frames.
+    pub fn masses(&self) -> impl Iterator<Item = (Vec<usize>, &DMatrix<f64>)> {
+        self.gaps
+            .iter()
+            .map(|gap| (gap.bodies().collect(), &gap.film))
+    }
+
+    /// Adds to what modes and twists see of each other's charges, of the twists as impulses, films' own left out.
     pub fn add_exchanged(
         &self,
         twists: &DVector<f64>,
@@ -146,7 +153,6 @@ impl<'a> Narrow<'a> {
                 let rows = impulses.as_mut_slice()[6 * b..6 * b + 6].iter_mut();
                 rows.zip(of_twists).for_each(|(o, x)| *o += FLUX * x);
             }
-            self.add_film_of(gap, twists, impulses);
         }
     }
 

@@ -226,8 +226,20 @@ impl Scattered<'_> {
         of_each(model.bodies.len(), of_body).concat()
     }
 
-    /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other, and the impulses of films.
+    /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), and the impulses of films.
     pub(super) fn exchanged(
+        &self,
+        making: &Making<'_>,
+        twists: &DVector<f64>,
+        modes: &[f64],
+    ) -> (Vec<f64>, DVector<f64>) {
+        let (seen, mut impulses) = self.exchanged_beside_films(making, twists, modes);
+        self.narrow.add_impulses(twists, &mut impulses);
+        (seen, impulses)
+    }
+
+    /// [Lᵀ, 4π Ūᵀ] Ĝ (Ū x̄ + L a), by what few numbers see of each other.
+    pub(super) fn exchanged_beside_films(
         &self,
         making: &Making<'_>,
         twists: &DVector<f64>,
@@ -356,6 +368,16 @@ impl Scattered<'_> {
         let mut out = answer.exchanged.clone();
         self.add_own(&answer.twists, &mut out);
         out
+    }
+
+    /// The bodies of each film and the impulses of it to their twists, body frames, unit density.
+    pub fn films(&self) -> impl Iterator<Item = (Vec<usize>, &DMatrix<f64>)> {
+        self.narrow.masses()
+    }
+
+    /// Adds the impulses of films.
+    pub fn add_films(&self, twists: &DVector<f64>, out: &mut DVector<f64>) {
+        self.narrow.add_impulses(twists, out);
     }
 
     /// Adds each body's own impulses.

@@ -10,13 +10,14 @@
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
-use super::hessian::{Hessian, Places};
+use super::hessian::Hessian;
 use super::split::share;
 use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::dynamics::Dual;
 use crate::dynamics::slopes::columns;
+use crate::dynamics::tied::Places;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::cell::Cell;

@@ -9,7 +9,7 @@ use super::stage_matrix::{excess, stage_matrix};
 use crate::Result;
 use crate::dynamics::Linearisation;
 use crate::dynamics::island_matrix::{IslandFactor, IslandMatrix};
-use crate::dynamics::recoil::Recoiling;
+use crate::dynamics::recoil::{Own, Recoiling};
 use nalgebra::DVector;
 
 /// Such a factor.
@@ -74,7 +74,7 @@ impl<'e, 'a> StageMatrix<'e, 'a> {
             let found = factor.solve(&free.take(right));
             found.map_or_else(|| DVector::zeros(right.len()), |x| free.put(&x))
         };
-        let many = Recoiling::new(self.e, at, Box::new(own));
+        let many = Recoiling::new(self.e, at, Own::new(false, own));
         Some(StageFactor::Recoiling(many, split.clone()))
     }
 }

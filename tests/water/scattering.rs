@@ -323,7 +323,8 @@ fn small_bodies_beside_a_large_one_are_as_exact() {
                 more.rows_mut(48, 6).fill(0.0);
                 twists += more;
                 let right = exchanged(&factor, &poses, &twists);
-                worst = worst.max(worst_of(&at.respond(&twists).exchanged, &right, 0..9));
+                // Of the large one the factor's has its own in it, a rounding of which is more than what others add.
+                worst = worst.max(worst_of(&at.respond(&twists).exchanged, &right, 0..8));
             }
             at.check().unwrap();
             let known = at.report().iterations;
@@ -357,7 +358,7 @@ fn small_bodies_beside_a_large_one_are_as_exact() {
                 at.report().iterations
             );
             assert!(
-                worst < 1e-7 && freed < 1e-7,
+                worst < 1e-9 && freed < 1e-9,
                 "{size} {speeds:?}: {worst} {freed}"
             );
         }
@@ -826,8 +827,8 @@ fn bodies_in_one_another_are_an_error_not_a_number() {
     }
 }
 
-/// Where points don't resolve a gap, I − LᵀGL has no positive energy and the factor says so. A search finds something there as well: what has less than no energy is refused by the
-/// names of the nearest, and nothing else is told.
+/// Where points don't resolve a gap, I − LᵀGL has no positive energy and the factor says so. A search finds something there as well: what has less than no energy, and a search
+/// whose directions show it, is refused by the names of the nearest.
 #[test]
 fn what_has_no_energy_is_refused() {
     let kinds = edged(0.03);
@@ -863,5 +864,5 @@ fn what_has_no_energy_is_refused() {
         }
     }
     println!("of {refused} that the factor refuses {told} are refused by products");
-    assert!(refused > 0 && 2 * told > refused, "{told} of {refused}");
+    assert!(refused > 0 && told == refused, "{told} of {refused}");
 }

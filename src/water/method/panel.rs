@@ -322,7 +322,12 @@ mod tests {
             corner(0.0, 1.0, 0.0),
             corner(0.0, 0.0, top),
         ];
-        TriMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).unwrap()
+        TriMesh::new(
+            "tetrahedron",
+            vertices,
+            vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+        )
+        .unwrap()
     }
 
     #[test]

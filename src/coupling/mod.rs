@@ -17,6 +17,7 @@
 //! a [`Coupling`]; one that has derivatives too is also [`Linearise`].
 
 mod exclude;
+mod fade;
 pub(crate) mod film;
 pub mod full;
 mod given;

@@ -8,13 +8,17 @@ use super::{Evaluation, Parameters, System};
 use crate::adjoint::lie::{Mat6, Vec6};
 use crate::adjoint::rigid;
 use crate::adjoint::solve::{Definite, is_scaled_above, smallest_scaled_eigenvalue};
-use crate::multibody::Articulated;
+use crate::multibody::{Articulated, Link};
 use crate::once::once;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
 /// Smallest eigenvalue, the diagonal scaled to one, from which on an inertia counts as positive definite.
 const LEAST: f64 = 1e-13;
+/// Part of an energy's parts from which on below zero it isn't what solves leave.
+const NEGATIVE: f64 = 1e-3;
+/// What a factor tells of an inertia.
+const EIGENVALUE: &str = "smallest eigenvalue, diagonal scaled to one";
 
 /// The rows and columns of the mass matrix that forces decide, factored. Right-hand sides and solutions have an entry per velocity; those of driven ones aren't read,
 /// and zero.
@@ -126,6 +130,7 @@ impl<'a> Evaluation<'a> {
     ) -> Result<DVector<f64>> {
         let factor = self.factored(free)?;
         let moved = driven.iter().any(|x| *x != 0.0);
+        let asked = right.clone();
         let v = match (&factor, &self.fluid) {
             (Inertia::Recoiling(many), FluidMomenta::Scattered(at)) => {
                 if moved {
@@ -141,7 +146,29 @@ impl<'a> Evaluation<'a> {
             }
         };
         self.check()?;
+        // Of driven velocities what the others exchange isn't in what was asked.
+        if !moved {
+            self.check_energy(&v, &asked)?;
+        }
         Ok(v)
+    }
+
+    /// Whether `v`, which solves M v = `right` on its rows that aren't zero, has energy: where many bodies are coupled by products there is no factor of M that would tell.
+    ///
+    /// # Errors
+    /// A mass matrix that isn't positive definite, by the joint at which most is below zero. One that is so along other velocities isn't noticed.
+    pub(crate) fn check_energy(&self, v: &DVector<f64>, right: &DVector<f64>) -> Result<()> {
+        let parts = v.component_mul(right);
+        let (sum, size) = (parts.sum(), parts.abs().sum());
+        if self.scattered().is_none() || !(sum < -NEGATIVE * size) {
+            return Ok(());
+        }
+        let of_joint = |link: &Link| parts.rows_range(link.v.clone()).sum();
+        let joints = self.system.tree.links().iter().filter(|l| !l.v.is_empty());
+        let worst = joints.min_by(|a, b| of_joint(a).total_cmp(&of_joint(b)));
+        let place = self.at_joint(worst.map(|link| link.v.start));
+        let quantity = "energy of a velocity that it has, in that of its parts";
+        Err(unresolved(place, quantity, sum / size, 0.0))
     }
 
     /// Whether the water's solves so far met their tolerance.
@@ -185,7 +212,8 @@ impl<'a> Evaluation<'a> {
             let rows: Vec<usize> = rows.iter().map(|row| free[*row]).collect();
             let factor = definite(block).map_err(|found| {
                 let smallest = found.smallest;
-                unresolved(self.at_joint(found.weakest.map(|k| rows[k])), smallest)
+                let place = self.at_joint(found.weakest.map(|k| rows[k]));
+                unresolved(place, EIGENVALUE, smallest, LEAST)
             })?;
             factors.push((rows, factor));
         }
@@ -231,7 +259,7 @@ impl<'a> Evaluation<'a> {
         Articulated::new(tree, kinematics, &inertias, free, LEAST).map_err(|found| {
             let name = &self.system.bodies[found.body].name;
             let place = format!("mass matrix M(q), at the joint of body {name:?}");
-            unresolved(place, found.smallest)
+            unresolved(place, EIGENVALUE, found.smallest, LEAST)
         })
     }
 
@@ -246,7 +274,8 @@ impl<'a> Evaluation<'a> {
             }
             Err(found) => {
                 let weakest = found.weakest.map(|k| free[k]);
-                Err(unresolved(self.at_joint(weakest), found.smallest))
+                let place = self.at_joint(weakest);
+                Err(unresolved(place, EIGENVALUE, found.smallest, LEAST))
             }
         }
     }
@@ -313,12 +342,12 @@ fn least_direction(a: &DMatrix<f64>) -> Option<DVector<f64>> {
     Some(found.eigenvectors.column(least).into_owned())
 }
 
-fn unresolved(place: String, smallest: f64) -> Error {
+fn unresolved(place: String, quantity: &str, value: f64, limit: f64) -> Error {
     Error::Unresolved {
         place,
-        quantity: "smallest eigenvalue, diagonal scaled to one".into(),
-        value: smallest,
-        limit: LEAST,
+        quantity: quantity.into(),
+        value,
+        limit,
         remedy: "M must be positive definite. At the start: give massless bodies mass, inertia or added \
                  mass, refine the meshes where a gap isn't resolved, or take away a given added mass that is far \
                  smaller than what others change of it. Later: the run may have blown up, \

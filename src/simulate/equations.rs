@@ -182,9 +182,10 @@ impl Equations<'_> {
         if given.iter().any(|x| *x != 0.0) {
             right -= self.at.mass_times(&given);
         }
-        let found = given + self.at.factored(&free)?.solve(&right);
+        let found = self.at.factored(&free)?.solve(&right);
         self.at.check()?;
-        Ok(found)
+        self.at.check_energy(&found, &right)?;
+        Ok(given + found)
     }
 
     /// Inverse dynamics: the generalised forces τ at which the acceleration is `acceleration` (m/s², rad/s²); of driven joints what drives them.

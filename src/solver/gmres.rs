@@ -34,6 +34,9 @@ pub fn gmres_beside(
     CALLS.add(1);
     let n = b.columns;
     let mut x = Columns::zeros(b.rows + beside, n);
+    // In parts of each column's largest entry: squares of the entries may not be numbers where the entries are.
+    let most = largest(b);
+    let b = &Columns::from_fn(b.rows, n, |i, k| b.at(i, k) / most[k]);
     let size = norms(b);
     let mut residual: Vec<f64> = size
         .iter()
@@ -79,6 +82,9 @@ pub fn gmres_beside(
         }
         r = select(&r, &left);
         active = left.iter().map(|c| active[*c]).collect();
+    }
+    for row in x.data.chunks_exact_mut(n.max(1)) {
+        row.iter_mut().zip(&most).for_each(|(x, most)| *x *= most);
     }
     Outcome {
         x,
@@ -242,6 +248,21 @@ fn places(of: &[usize], owners: &[usize]) -> Vec<usize> {
     owners.iter().filter_map(place).collect()
 }
 
+/// The largest entry of each column by size, rounded to a power of two, by which nothing is rounded; one of a column of zeros, or of what aren't numbers.
+fn largest(x: &Columns) -> Vec<f64> {
+    let mut most = vec![0.0_f64; x.columns];
+    for row in x.data.chunks_exact(x.columns.max(1)) {
+        for (most, x) in most.iter_mut().zip(row) {
+            *most = most.max(x.abs());
+        }
+    }
+    let power = |most: &f64| most.log2().floor().clamp(-1000.0, 1000.0).exp2();
+    let usable = |most: &f64| most.is_finite() && *most > 0.0;
+    most.iter()
+        .map(|most| if usable(most) { power(most) } else { 1.0 })
+        .collect()
+}
+
 fn norms(x: &Columns) -> Vec<f64> {
     x.dots(x).into_iter().map(f64::sqrt).collect()
 }
@@ -337,6 +358,26 @@ mod tests {
         // Of nothing it is nothing.
         let none = gmres_beside(apply, 3, &Columns::zeros(n, 1), 1e-11, 9, 9);
         assert_eq!(none.x.data, vec![0.0; n + 3]);
+    }
+
+    #[test]
+    fn how_large_a_right_hand_side_is_changes_nothing_else() {
+        let n = 40;
+        let a = matrix(n);
+        let apply = |v: &Columns, _: &[usize]| [v.clone(), product(&a, n, v)];
+        let b = |size: f64| Columns::from_fn(n, 1, |i, _| size * (0.4 * i as f64).cos());
+        let right = gmres(apply, &b(1.0), 1e-11, 500, 60);
+        for power in [-1000, -532, -100, 300, 1000] {
+            let size = 2.0_f64.powi(power);
+            let found = gmres(apply, &b(size), 1e-11, 500, 60);
+            assert!(found.residual <= 1e-11 && found.iterations == right.iterations);
+            for (found, right) in found.x.data.iter().zip(&right.x.data) {
+                assert_eq!(*found, size * right, "{power}");
+            }
+        }
+        // Of numbers that are all but none what can be told of them.
+        let least = gmres(apply, &b(1e-310), 1e-6, 500, 60);
+        assert!(least.residual <= 1e-6 && least.x.data.iter().any(|x| *x != 0.0));
     }
 
     #[test]

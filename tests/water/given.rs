@@ -2,8 +2,9 @@
 
 use crate::support::says;
 use hydrograd::adjoint::lie::Mat6;
+use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Current, Fluid, Motion, Scene, Shape};
-use hydrograd::simulate::Method;
+use hydrograd::simulate::{Exchange, Method};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 
@@ -220,6 +221,23 @@ fn one_that_leaves_no_inertia_is_refused_by_name() {
         let refused = found.and_then(|s| s.rollout(&Controls::zeros(&s, 1)).map(|_| ()));
         let message = refused.expect_err("no inertia").to_string();
         println!("{how:?}: {message}");
+        says(message, &["mass matrix M(q)", "t\"", "given added mass"]);
+    }
+    // By products alone there is no factor of both: a velocity of less than no energy tells.
+    scene.initial.v = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0].repeat(2);
+    for integrator in [
+        Integrator::MomentumEuler,
+        Integrator::Rk4,
+        Integrator::Midpoint,
+    ] {
+        let settings = settings(HOW[0])
+            .fidelity(Fidelity::Reduced)
+            .exchange(Exchange::Products)
+            .integrator(integrator);
+        let found = Simulator::new(&scene, settings);
+        let refused = found.and_then(|s| s.rollout(&Controls::zeros(&s, 1)).map(|_| ()));
+        let message = refused.expect_err("no inertia").to_string();
+        println!("{integrator:?} by products: {message}");
         says(message, &["mass matrix M(q)", "t\"", "given added mass"]);
     }
 }

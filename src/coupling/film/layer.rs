@@ -5,6 +5,7 @@ use super::jet::{
     Displaced, Distance, Jet, Vector, add, constant, dot, minus, product, real, scale, zero,
 };
 use super::surface::Element;
+use crate::coupling::fade::opening;
 use crate::geometry::Field;
 
 /// Power of the distances with which vertices count in a link's gap.
@@ -302,28 +303,6 @@ pub(super) fn weight<D: Jet>(d: D, area: f64, end: f64, scale: f64) -> Option<D>
         square * square * square
     };
     (d.re() < end).then(|| near() * fade())
-}
-
-/// t³/(1 − t)³ from 0 on.
-fn opening<D: Jet>(t: D) -> D {
-    match t.re() <= 0.0 {
-        true => D::from(0.0),
-        false => {
-            let part = t / (-t + 1.0);
-            part * part * part
-        }
-    }
-}
-
-/// Its derivative.
-pub(super) fn opening_slope<D: Jet>(t: D) -> D {
-    match t.re() <= 0.0 {
-        true => D::from(0.0),
-        false => {
-            let square = (-t + 1.0) * (-t + 1.0);
-            t * t * 3.0 / (square * square)
-        }
-    }
 }
 
 impl<D: Jet> Thickness<D> {

@@ -3,8 +3,9 @@
 use super::Film;
 use super::jet::{Displaced, Jet, Screw, Vector, add, add_scaled, constant, cross, scale};
 use super::jet::{whole, zero};
-use super::layer::{BACK, Layer, NEAREST, OPENING, opening_slope, weight};
+use super::layer::{BACK, Layer, NEAREST, OPENING, weight};
 use crate::adjoint::lie::Vec6;
+use crate::coupling::fade::opening_slope;
 
 /// Cotangents of what the flow in a film takes from a [`Layer`].
 pub(super) struct Cotangents<D> {

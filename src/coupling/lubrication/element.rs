@@ -145,14 +145,6 @@ impl Point {
     }
 }
 
-/// t³/(1 − t)³ from 0 on, and its derivative.
-pub(super) fn opening(t: f64) -> [f64; 2] {
-    match t <= 0.0 {
-        true => [0.0; 2],
-        false => [(t / (1.0 - t)).powi(3), 3.0 * t * t / (1.0 - t).powi(4)],
-    }
-}
-
 /// From 1 at 0 to 0 at 1, and its derivative; twice continuously differentiable.
 pub(super) fn fade(t: f64) -> [f64; 2] {
     if t <= 0.0 {

@@ -1,11 +1,12 @@
 //! The pressure in a bearing at a pose, and the damping that it makes.
 
 use super::Bearing;
-use super::element::{Cell, Point, fade, opening};
+use super::element::{Cell, Point, fade};
 use super::patch::Patch;
 use super::thickness::{Thickness, thickness};
 use crate::Error;
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, point_velocity, point_wrench};
+use crate::coupling::fade::{opening, opening_slope};
 use crate::solver::{SparsePattern, elimination_order};
 use nalgebra::{DMatrix, SMatrix};
 use std::sync::Arc;
@@ -251,7 +252,7 @@ impl Layer {
     /// What leads into the open where the film ends, of the pressure times H², and its derivatives by the thickness, by what is outside, and by the area of sides.
     pub fn leak(&self) -> [f64; 4] {
         let h = self.thickness.value;
-        let [open, slope] = opening(self.outside);
+        let (open, slope) = (opening(self.outside), opening_slope(self.outside));
         let scale = OPENING / 12.0 * h.powi(-3);
         let leak = scale * (self.area * open + self.side);
         [leak, -3.0 * leak / h, scale * self.area * slope, scale]

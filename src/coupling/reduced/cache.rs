@@ -46,20 +46,35 @@ impl Key {
     ) -> Self {
         let mut digest = Sha256::new();
         digest.update(FORMAT);
-        for x in mesh.vertices().iter().flat_map(|v| v.iter()) {
-            digest.update(x.to_bits().to_le_bytes());
-        }
-        for i in mesh.faces().iter().flatten() {
-            digest.update((*i as u64).to_le_bytes());
-        }
+        add(&mut digest, mesh);
         // Settings are plain data: they always serialise.
         digest.update(serde_json::to_vec(&(method, settings, regions)).unwrap_or_default());
         Self(digest.finalize().into())
     }
 
     fn hex(&self) -> String {
-        self.0.iter().map(|b| format!("{b:02x}")).collect()
+        hex(&self.0)
     }
+}
+
+/// Digest of a mesh, for what a one-body method depends on beside the body's own.
+pub fn mesh_digest(mesh: &TriMesh) -> String {
+    let mut digest = Sha256::new();
+    add(&mut digest, mesh);
+    hex(&digest.finalize())
+}
+
+fn add(digest: &mut Sha256, mesh: &TriMesh) {
+    for x in mesh.vertices().iter().flat_map(|v| v.iter()) {
+        digest.update(x.to_bits().to_le_bytes());
+    }
+    for i in mesh.faces().iter().flatten() {
+        digest.update((*i as u64).to_le_bytes());
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// A body, and why it couldn't be kept in the folder, if it couldn't.

@@ -71,6 +71,7 @@ pub(super) struct ReducedResponse {
 impl<'a> ReducedLinearised<'a> {
     pub fn new(reduced: &'a Reduced, poses: &[Pose], basis: &DMatrix<f64>) -> Result<Self> {
         check_asked(reduced, poses, basis)?;
+        reduced.check_memory()?;
         let films = reduced.placed_films(poses, basis)?;
         let place = |link: &'a Link| {
             let placed = link.place(&reduced.bodies, poses, &films)?;

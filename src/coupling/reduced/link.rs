@@ -2,6 +2,7 @@
 
 use super::ReducedBody;
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::coupling::fade::fade;
 use crate::geometry::Image;
 use std::sync::Arc;
 
@@ -21,17 +22,11 @@ impl Cutoff {
     pub fn weight(&self, c: f64) -> [f64; 3] {
         let width = self.far - self.near;
         let t = (c - self.near) / width;
-        if t <= 0.0 {
-            return [1.0, 0.0, 0.0];
-        }
-        if t >= 1.0 {
-            return [0.0; 3];
-        }
-        let s = 1.0 - t;
-        // 1 − t⁴(35 − 84t + 70t² − 20t³)
-        let value = 1.0 - t.powi(4) * (35.0 + t * (-84.0 + t * (70.0 - 20.0 * t)));
-        let first = -140.0 * (t * s).powi(3);
-        let second = -420.0 * (t * s).powi(2) * (1.0 - 2.0 * t);
+        let [value, first] = fade(t);
+        let second = match t > 0.0 && t < 1.0 {
+            true => -420.0 * (t * (1.0 - t)).powi(2) * (1.0 - 2.0 * t),
+            false => 0.0,
+        };
         [value, first / width, second / (width * width)]
     }
 }

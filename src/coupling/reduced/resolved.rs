@@ -2,6 +2,7 @@
 
 use super::Reduced;
 use crate::adjoint::lie::{Pose, Vec3};
+use crate::memory;
 use crate::{Error, Result};
 use nalgebra::DMatrix;
 
@@ -14,6 +15,17 @@ const ILL_CONDITIONED: f64 = 1e4;
 const ROUNDING: f64 = 1e-7;
 
 impl Reduced {
+    /// Whether what one evaluation is solved with can be had: I − LᵀGL, and what the bodies of every pair that never fades see of each other.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with the bytes that it would take.
+    pub(super) fn check_memory(&self) -> Result<()> {
+        let lasting = self.links.iter().filter(|link| link.cutoff.is_none());
+        let columns = |b: usize| (self.bodies[b].modes() + 6) as f64;
+        let blocks = lasting.map(|link| columns(link.target) * columns(link.source));
+        check_factor(&self.names, self.mode_count() as f64, blocks.sum())
+    }
+
     /// The error of a system I − LᵀGL that isn't positive definite: some vector's quotient is `value`.
     pub(crate) fn indefinite(&self, poses: &[Pose], value: f64) -> Error {
         let quantity = "smallest eigenvalue of I − LᵀGL, at most";
@@ -37,6 +49,22 @@ impl Reduced {
         }
         Ok(())
     }
+}
+
+/// Whether the factor of so many modes, with blocks of so many numbers beside it, can be had.
+fn check_factor(names: &[String], modes: f64, blocks: f64) -> Result<()> {
+    let twists = 6.0 * names.len() as f64;
+    // With what the modes see of twists, and twists of each other.
+    let numbers = modes * (modes + twists) + twists * twists + blocks;
+    let first = names.first().map_or("", String::as_str);
+    memory::fits(
+        &format!(
+            "coupling {} bodies, {first:?} the first, by a factor of their {modes} modes",
+            names.len()
+        ),
+        memory::numbers(numbers),
+        "use the exchange products, a coarser accuracy, or the fidelity auto, whose pairs fade out",
+    )
 }
 
 /// What the pair of bodies that come closest, against what they resolve, doesn't.
@@ -161,5 +189,27 @@ mod tests {
         };
         // (1 − 2)/4, but for rounding.
         assert!((value + 0.25).abs() < 1e-3, "{value}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_factor;
+
+    #[test]
+    fn a_factor_that_does_not_fit_is_refused_before_it_is_made() {
+        let names: Vec<String> = (0..9).map(|k| format!("stone {k}")).collect();
+        assert!(check_factor(&names, 1e3, 1e4).is_ok());
+        let said = check_factor(&names, 1e8, 0.0).unwrap_err().to_string();
+        for part in [
+            "9 bodies",
+            "stone 0",
+            "100000000 modes",
+            "8.0",
+            "bytes",
+            "products",
+        ] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
     }
 }

@@ -6,14 +6,17 @@
 use super::Scattering;
 use super::kept::{Answer, Kept, Near, Told};
 use super::levels::Levels;
+use super::quotients::Quotients;
 use super::scattered::{Scattered, plus};
+use super::unlike::{Both, count_twists, norm};
 use crate::adjoint::lie::Vec6;
 use crate::coupling::CouplingReport;
 use crate::coupling::reduced::FLUX;
 use crate::coupling::settings::met;
-use crate::solver::{Columns, dot, gmres_beside};
+use crate::solver::{Columns, gmres_beside};
 use crate::{Error, Result};
 use nalgebra::DVector;
+use std::cell::RefCell;
 use std::sync::{Arc, MutexGuard, PoisonError};
 
 const ITERATIONS: usize = 300;
@@ -150,7 +153,7 @@ impl Scattered<'_> {
         if let Some(lost) = kept.lost.take() {
             return Err(lost);
         }
-        if let Some(energy) = kept.negative {
+        if let Some((quantity, value)) = kept.negative {
             return Err(Error::Unresolved {
                 place: match self.nearest() {
                     Some([a, b]) => format!(
@@ -161,8 +164,8 @@ impl Scattered<'_> {
                     ),
                     None => "exchange between many bodies".into(),
                 },
-                quantity: "energy of the water, in that of the water displaced".into(),
-                value: energy,
+                quantity: quantity.into(),
+                value,
                 limit: 0.0,
                 remedy: UNRESOLVED.into(),
             });
@@ -189,33 +192,73 @@ impl Scattered<'_> {
 
     /// a = Lᵀ(ψ + Ĝ L a), from what else the modes see.
     pub(super) fn scattered(&self, right: &[f64]) -> Solved {
-        self.scattered_to(right, self.model.levels.tolerance)
+        self.scattered_to(right, [self.model.levels.tolerance; 2])
     }
 
-    /// The same to a relative residual.
-    fn scattered_to(&self, right: &[f64], goal: f64) -> Solved {
+    /// The same to relative residuals.
+    fn scattered_to(&self, right: &[f64], goal: Both) -> Solved {
         let still = DVector::zeros(6 * self.model.bodies.len());
         let sums = self.making();
-        let seen = |a: &[f64]| self.exchanged(&sums, &still, a);
-        self.solve(right, goal, seen, |modes, _| modes.to_vec())
-    }
-
-    /// The relative residual of a solve from `right` whose absolute one is given.
-    fn relative(&self, goal: f64, right: &[f64]) -> f64 {
-        let (size, full) = (norm(right), self.model.levels.tolerance);
-        match size > 0.0 {
-            true => (goal / size).min(COARSE).max(full),
-            false => full,
+        let quotients = RefCell::new(Quotients::default());
+        let seen = |a: &[f64]| {
+            let (modes, impulses) = self.exchanged(&sums, &still, a);
+            quotients.borrow_mut().push(a, &plus(a, -1.0, &modes));
+            (modes, impulses)
+        };
+        let found = self.solve(right, goal, seen, |modes, _| modes.to_vec());
+        if let Some(below) = quotients.into_inner().negative() {
+            let quantity = "smallest eigenvalue of I − LᵀGL, at most";
+            self.kept().negative.get_or_insert((quantity, below));
         }
+        found
     }
 
-    /// x with x = right + f(what x makes seen), both linear, to a relative residual. What is seen of the directions of the search adds up to what is seen of x, at no further product.
+    /// The relative residuals of a solve from `right` whose absolute ones are given.
+    fn relative(&self, goal: Both, right: &[f64]) -> Both {
+        let (sizes, full) = (self.model.both(right), self.model.levels.tolerance);
+        [0, 1].map(|k| match sizes[k] > 0.0 {
+            true => (goal[k] / sizes[k]).min(COARSE).max(full),
+            false => full,
+        })
+    }
+
+    /// x with x = right + f(what x makes seen), both linear, to relative residuals. What is seen of the directions of the search adds up to what is seen of x, at no further product.
     fn solve(
         &self,
         right: &[f64],
-        goal: f64,
+        goal: Both,
         seen: impl Fn(&[f64]) -> (Vec<f64>, DVector<f64>),
         f: impl Fn(&[f64], &DVector<f64>) -> Vec<f64>,
+    ) -> Solved {
+        let model = self.model;
+        let first = self.search((right, goal[0], 1.0), |_| 1.0, &seen, &f);
+        let Some(weights) = &model.unlike else {
+            return first;
+        };
+        // What the small among unlike bodies still lack.
+        let lacking = plus(right, 1.0, &f(&first.seen, &first.impulses));
+        let lacking = plus(&lacking, -1.0, &first.x);
+        let part = model.both(&lacking)[1] / model.both(right)[1];
+        // Nothing where nothing was asked for, or what isn't a number was found.
+        if !(part > goal[1] && part.is_finite()) {
+            return first;
+        }
+        let asked = (&lacking[..], goal[1] / part, part);
+        let more = self.search(asked, |b| weights[b], &seen, &f);
+        Solved {
+            x: plus(&first.x, 1.0, &more.x),
+            seen: plus(&first.seen, 1.0, &more.seen),
+            impulses: first.impulses + more.impulses,
+        }
+    }
+
+    /// The same where every body counts so many times, to one relative residual; with the part that the right-hand side is of what was asked for first.
+    fn search(
+        &self,
+        (right, goal, part): (&[f64], f64, f64),
+        weight: impl Fn(usize) -> f64,
+        seen: &impl Fn(&[f64]) -> (Vec<f64>, DVector<f64>),
+        f: &impl Fn(&[f64], &DVector<f64>) -> Vec<f64>,
     ) -> Solved {
         let column = |data: Vec<f64>| Columns {
             rows: data.len(),
@@ -223,14 +266,16 @@ impl Scattered<'_> {
             data,
         };
         let apply = |v: &Columns, _: &[usize]| {
-            let (modes, impulses) = seen(&v.data);
-            let image = plus(&v.data, -1.0, &f(&modes, &impulses));
-            let beside = [&v.data, &modes, impulses.as_slice()].concat();
+            let x = self.model.counted(&v.data, |b| 1.0 / weight(b));
+            let (modes, impulses) = seen(&x);
+            let image = plus(&x, -1.0, &f(&modes, &impulses));
+            let image = self.model.counted(&image, &weight);
+            let beside = [&x, &modes, impulses.as_slice()].concat();
             [column(beside), column(image)]
         };
         let modes = self.model.mode_count();
         let beside = modes + 6 * self.model.bodies.len();
-        let right = column(right.to_vec());
+        let right = column(self.model.counted(right, &weight));
         let found = gmres_beside(apply, beside, &right, goal, ITERATIONS, RESTART);
         // As if the levels' was asked for.
         let tolerance = self.model.levels.tolerance;
@@ -239,7 +284,7 @@ impl Scattered<'_> {
         kept.report.iterations = kept.report.iterations.max(found.iterations);
         kept.report.residual = kept.report.residual.max(residual);
         if !met(residual, tolerance) && kept.failed.is_none() {
-            kept.failed = Some((found.iterations, found.residual));
+            kept.failed = Some((found.iterations, part * found.residual));
         }
         let mut x = found.x.data;
         let mut seen = x.split_off(right.rows);
@@ -248,21 +293,32 @@ impl Scattered<'_> {
     }
 
     /// About the root of twice the energy of twists, each alone and axis by axis, at unit density.
-    fn size(&self, twists: &DVector<f64>) -> f64 {
-        self.weighed(twists).norm()
+    fn size(&self, twists: &DVector<f64>) -> Both {
+        self.model.both_of_twists(self.weighed(twists).as_slice())
     }
 
-    /// What moves hardly any water, such as a ball's spin, counts a little.
+    /// Of the water that the shapes move or, where it is more, what is given in the place of it: charges know of shapes alone. What moves hardly any water, such as a ball's spin,
+    /// counts a little.
     fn weighed(&self, twists: &DVector<f64>) -> DVector<f64> {
         let (own, sizes) = (self.model.own(), &self.model.sizes);
         let mut out = twists.clone();
         for (b, twist) in out.as_mut_slice().chunks_exact_mut(6).enumerate() {
-            let diagonal = own[b].diagonal();
+            let shape = self.model.bodies[b].parts().added_mass.diagonal();
+            let diagonal = own[b].diagonal().sup(&shape);
             let most = diagonal.rows(0, 3).max();
             for (i, x) in twist.iter_mut().enumerate() {
                 let least = LEAST * most * if i < 3 { 1.0 } else { sizes[b] * sizes[b] };
                 *x *= diagonal[i].max(least).sqrt();
             }
+        }
+        out
+    }
+
+    /// The same where all bodies count alike.
+    fn weighed_alike(&self, twists: &DVector<f64>) -> DVector<f64> {
+        let mut out = self.weighed(twists);
+        if let Some(weights) = &self.model.unlike {
+            count_twists(out.as_mut_slice(), |b| weights[b]);
         }
         out
     }
@@ -273,7 +329,7 @@ impl Scattered<'_> {
         // Orthonormal sums of theirs, each with its coefficients.
         let mut basis: Vec<[DVector<f64>; 2]> = Vec::new();
         for (k, answer) in known.iter().enumerate() {
-            let mut direction = self.weighed(&answer.solved);
+            let mut direction = self.weighed_alike(&answer.solved);
             let size = direction.norm();
             let mut sum = DVector::zeros(known.len());
             sum[k] = 1.0;
@@ -290,7 +346,7 @@ impl Scattered<'_> {
                 basis.push([direction / norm, sum / norm]);
             }
         }
-        let wanted = self.weighed(twists);
+        let wanted = self.weighed_alike(twists);
         let mut sum = DVector::zeros(known.len());
         for [direction, of] in &basis {
             sum += direction.dot(&wanted) * of;
@@ -307,7 +363,8 @@ impl Scattered<'_> {
             add(*weight, &answer.left, &mut out.left);
             out.exchanged.axpy(*weight, &answer.exchanged, 1.0);
         }
-        let nearer = self.size(&(twists - &out.twists)) <= NEARER * wanted.norm();
+        let rest = self.weighed_alike(&(twists - &out.twists));
+        let nearer = rest.norm() <= NEARER * wanted.norm();
         (!known.is_empty() && nearer).then_some(out)
     }
 
@@ -336,11 +393,14 @@ impl Scattered<'_> {
             }
             Some(near) => {
                 let rest = twists - &near.twists;
-                let lacking = self.size(&rest) + FLUX.sqrt() * norm(&near.left);
-                if lacking > tolerance * self.size(twists) {
+                let (lacks, size) = (self.size(&rest), self.size(twists));
+                let left = self.model.both(&near.left);
+                let lacking = |k: usize| lacks[k] + FLUX.sqrt() * left[k] > tolerance * size[k];
+                if lacking(0) || lacking(1) {
                     let (seen, moved) = self.exchanged(&sums, &rest, &none);
                     let right = plus(&seen, -1.0, &near.left);
-                    let goal = self.relative(tolerance * ASKED * norm(&near.modes), &right);
+                    let modes = self.model.both(&near.modes);
+                    let goal = self.relative(modes.map(|size| tolerance * ASKED * size), &right);
                     let found = self.scattered_to(&right, goal);
                     // What the sum sees is its modes but for what is left of them, which the right-hand side has.
                     let seen = plus(&plus(&near.modes, 1.0, &right), 1.0, &found.seen);
@@ -376,7 +436,8 @@ impl Scattered<'_> {
         let energy = own + told.twists.dot(&told.exchanged);
         if energy < -NEGATIVE * displaced {
             let mut kept = self.kept();
-            kept.negative.get_or_insert(energy / displaced);
+            let quantity = "energy of the water, in that of the water displaced";
+            kept.negative.get_or_insert((quantity, energy / displaced));
         }
     }
 
@@ -441,9 +502,10 @@ impl Scattered<'_> {
         }
         let full = self.model.levels.tolerance;
         let goal = match goal {
-            Goal::Full => full,
-            Goal::Relative(goal) => goal,
-            Goal::Absolute(goal) => self.relative(goal, &start),
+            Goal::Full => [full; 2],
+            Goal::Relative(goal) => [goal; 2],
+            // Where all count alike nothing is smaller.
+            Goal::Absolute(goal) => self.relative([goal; 2], &start),
         };
         let near = self.kept().near.take();
         let near = near.and_then(|Near { twists, modes }| {
@@ -459,8 +521,9 @@ impl Scattered<'_> {
         let Solved { x, seen, impulses } = match near {
             None => self.solve(&start, goal, seen, next),
             Some((x, own, moved, right)) => {
-                let goal = goal * norm(&start) / norm(&right);
-                let found = match goal < 1.0 {
+                let (all, lacked) = (self.model.both(&start), self.model.both(&right));
+                let goal = [0, 1].map(|k| goal[k] * all[k] / lacked[k]);
+                let found = match goal.iter().any(|goal| *goal < 1.0) {
                     true => self.solve(&right, goal, seen, next),
                     false => Solved::none(&x, &own, moved.len()),
                 };
@@ -505,10 +568,6 @@ impl Scattered<'_> {
         let twists = recoiled.twists.clone();
         self.keep(recoiled.told(twists));
     }
-}
-
-fn norm(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
 }
 
 /// `to` + `weight` x.

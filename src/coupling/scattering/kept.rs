@@ -53,8 +53,8 @@ pub(super) struct Kept {
     pub report: CouplingReport,
     /// Iterations and residual of the first solve that missed its tolerance.
     pub failed: Option<(usize, f64)>,
-    /// Energy of the first answer that has less than none, in that of the water displaced.
-    pub negative: Option<f64>,
+    /// The first of what must be above zero and isn't, in words, with its value.
+    pub negative: Option<(&'static str, f64)>,
     /// What the first to recoil begins from.
     pub near: Option<Near>,
     /// Why sums that are made elsewhere weren't; told once.

@@ -1,6 +1,7 @@
 //! How finely the exchange is cut into levels, for an accuracy.
 
 use crate::adjoint::multipole::Number;
+use crate::coupling::fade::fade;
 use crate::{Error, Result};
 
 /// Relative residual at which solves end: what gradients are held against is finer than any level.
@@ -76,21 +77,7 @@ impl Apart {
     /// Weight of the moments, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
     pub(super) fn weight<T: Number>(&self, ratio: T) -> [T; 2] {
         let width = self.most - self.sure;
-        let t = (ratio - T::constant(self.sure)) * (1.0 / width);
-        let (zero, one) = (T::constant(0.0), T::constant(1.0));
-        if t.value() <= 0.0 {
-            return [one, zero];
-        }
-        if t.value() >= 1.0 {
-            return [zero, zero];
-        }
-        let s = one - t;
-        let t3 = t * t * t;
-        let value = one
-            - t3 * t
-                * (((t * -20.0 + T::constant(70.0)) * t - T::constant(84.0)) * t
-                    + T::constant(35.0));
-        let slope = t3 * s * s * s * (-140.0 / width);
-        [value, slope]
+        let [value, slope] = fade((ratio - T::constant(self.sure)) * (1.0 / width));
+        [value, slope * (1.0 / width)]
     }
 }

@@ -36,10 +36,12 @@ mod near;
 mod pairs;
 mod parts;
 mod places;
+mod quotients;
 mod scattered;
 mod spare;
 mod sums;
 mod surface;
+mod unlike;
 
 pub use answers::{Goal, Own, Recoiled};
 pub use elsewhere::{Changed, Summing, SummingAt};
@@ -79,6 +81,8 @@ pub struct Scattering {
     numbers: Vec<Range<usize>>,
     /// Largest distance of a body's points from its centre, m; bodies and what mirrors show.
     sizes: Vec<f64>,
+    /// By how much each body counts more where all count alike, if they are unlike.
+    unlike: Option<Vec<f64>>,
     cells: Cells,
     /// Pairs of cells with bodies that don't feel each other.
     refused: BTreeSet<[usize; 2]>,
@@ -161,6 +165,7 @@ impl Scattering {
             modes: ranges(bodies.iter().map(|b| b.modes())),
             numbers: ranges(seen().map(|b| b.points().min(b.modes() + 6))),
             sizes: seen().map(size).collect(),
+            unlike: unlike::weights(&bodies),
             cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
             table: Table::new(levels.degree),
             refused: BTreeSet::new(),

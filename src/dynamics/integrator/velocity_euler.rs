@@ -26,9 +26,10 @@ fn acceleration<'a>(start: &Start<'_, 'a>) -> Result<(DVector<f64>, Inertia<'a>)
     }
     let right = e.inertial_force(v, &start.input.control)? - e.mass_times(&driven);
     let factor = e.factored(&split.free)?;
-    let found = driven + factor.solve(&right);
+    let found = factor.solve(&right);
     e.check()?;
-    Ok((found, factor))
+    e.check_energy(&found, &right)?;
+    Ok((driven + found, factor))
 }
 
 pub(super) fn step(start: &Start) -> Result<(State, Stages)> {

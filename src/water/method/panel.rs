@@ -7,6 +7,7 @@ use crate::boundary::PanelBoundary;
 use crate::boundary::panel::{Extrapolated, MassSlopes, Richardson, RichardsonSlopes};
 use crate::coupling::film::Films;
 use crate::coupling::full::SolveSettings;
+use crate::coupling::reduced::cache;
 use crate::coupling::{Coupling, ExtrapolatedPanels, FilmedPanels, PanelCoupled, ShapeDirection};
 use crate::water::device::Device;
 use crate::water::gap_error::Carried;
@@ -199,7 +200,7 @@ impl BodyMethod for Panel {
     }
 
     fn made_from(&self, body: &SubmergedBody, _: &Numerics) -> serde_json::Value {
-        let coarse = body.coarse.map(|c| c.mesh.faces().len());
+        let coarse = body.coarse.map(|c| (cache::mesh_digest(&c.mesh), c.ratio));
         serde_json::json!(["panel", coarse])
     }
 
@@ -304,5 +305,52 @@ impl BodyMethod for Panel {
     // Faces that lie in one another have no side to be seen from.
     fn may_touch(&self) -> bool {
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TriMesh;
+
+    /// A tetrahedron with its top at a height.
+    fn mesh(top: f64) -> TriMesh {
+        let corner = |x: f64, y: f64, z: f64| Vec3::new(x, y, z);
+        let vertices = vec![
+            corner(0.0, 0.0, 0.0),
+            corner(1.0, 0.0, 0.0),
+            corner(0.0, 1.0, 0.0),
+            corner(0.0, 0.0, top),
+        ];
+        TriMesh::new(
+            "tetrahedron",
+            vertices,
+            vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn another_coarse_mesh_is_another_body() {
+        let fine = mesh(1.0);
+        let key = |top: f64, ratio: Option<f64>| {
+            let coarse = Coarse {
+                mesh: mesh(top),
+                ratio,
+            };
+            let body = SubmergedBody {
+                name: "body",
+                mesh: Some(&fine),
+                ellipsoid: None,
+                solid: None,
+                coarse: Some(&coarse),
+                added_mass: None,
+                regions: Vec::new(),
+            };
+            Panel.made_from(&body, &Numerics::default())
+        };
+        assert_eq!(key(0.5, None), key(0.5, None));
+        assert_ne!(key(0.5, None), key(0.6, None));
+        assert_ne!(key(0.5, None), key(0.5, Some(2.0)));
     }
 }

@@ -190,11 +190,6 @@ mod tests {
         // (1 − 2)/4, but for rounding.
         assert!((value + 0.25).abs() < 1e-3, "{value}");
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::check_factor;
 
     #[test]
     fn a_factor_that_does_not_fit_is_refused_before_it_is_made() {

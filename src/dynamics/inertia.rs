@@ -160,7 +160,8 @@ impl<'a> Evaluation<'a> {
     pub(crate) fn check_energy(&self, v: &DVector<f64>, right: &DVector<f64>) -> Result<()> {
         let parts = v.component_mul(right);
         let (sum, size) = (parts.sum(), parts.abs().sum());
-        if self.scattered().is_none() || !(sum < -NEGATIVE * size) {
+        let below = sum < -NEGATIVE * size;
+        if self.scattered().is_none() || !below {
             return Ok(());
         }
         let of_joint = |link: &Link| parts.rows_range(link.v.clone()).sum();

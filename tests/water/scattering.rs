@@ -5,7 +5,7 @@ use hydrograd::adjoint::lie::{Mat6, Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::boundary::ExactBoundary;
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, compress};
-use hydrograd::coupling::scattering::{Apart, Goal, Levels, Motions, Scattering};
+use hydrograd::coupling::scattering::{Apart, Goal, Levels, Motions, Own, Scattering};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::dynamics::Integrator;
 use hydrograd::geometry::Image;
@@ -19,6 +19,18 @@ use std::sync::Arc;
 fn refusal<T>(made: hydrograd::Result<T>) -> String {
     made.err()
         .map_or("nothing was refused".into(), |e| e.to_string())
+}
+
+/// Bodies that recoil alone.
+fn recoiling<'r>(
+    scale: &'r DVector<f64>,
+    recoil: &'r dyn Fn(&DVector<f64>) -> DVector<f64>,
+) -> Own<'r> {
+    Own {
+        scale,
+        recoil,
+        films: false,
+    }
 }
 
 /// A round and a flat body of largest radius 1, compressed for gaps of about a tenth.
@@ -204,7 +216,7 @@ fn what_is_known_changes_no_answer_and_coarse_solves_add_up() {
     let scale = DVector::from_fn(6 * 27, |i, _| inertia(i).sqrt());
     let recoil = |h: &DVector<f64>| DVector::from_fn(h.len(), |i, _| h[i] / inertia(i));
     let solve = |first: &DVector<f64>, behind: Option<&[f64]>, goal: Goal| {
-        let found = at.recoil(first, behind, &scale, recoil, goal);
+        let found = at.recoil(first, behind, &recoiling(&scale, &recoil), goal);
         (first - recoil(&found.exchanged), found.left)
     };
     let (right, _) = solve(&x, None, Goal::Full);
@@ -346,7 +358,7 @@ fn small_bodies_beside_a_large_one_are_as_exact() {
                 .collect();
             let dense = DMatrix::from_columns(&columns).lu();
             let right = dense.solve(&first).unwrap();
-            let found = at.recoil(&first, None, &scale, recoil, Goal::Full);
+            let found = at.recoil(&first, None, &recoiling(&scale, &recoil), Goal::Full);
             let found = &first - recoil(&found.exchanged);
             let turned = |x: &DVector<f64>| {
                 DVector::from_fn(54, |i, _| x[i] * if i >= 51 { size } else { 1.0 })

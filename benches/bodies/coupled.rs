@@ -2,7 +2,7 @@
 
 use hydrograd::adjoint::lie::{Pose, Vec3, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::coupling::scattering::{Goal, Levels, Motions, Scattering};
+use hydrograd::coupling::scattering::{Goal, Levels, Motions, Own, Scattering};
 use hydrograd::dynamics::Integrator;
 use hydrograd::objective::Objective;
 use hydrograd::scene::{Body, Fluid, Joint, Motion, Scene, Shape};
@@ -272,7 +272,12 @@ pub fn iterations() -> hydrograd::Result<()> {
             let whole = move |i: usize| inertia(i) + if i % 6 < 3 { 0.5 * volume } else { 0.0 };
             let scale = DVector::from_fn(6 * 64, |i, _| whole(i).sqrt());
             let recoil = |h: &DVector<f64>| DVector::from_fn(h.len(), |i, _| h[i] / whole(i));
-            placed.recoil(&first, None, &scale, recoil, Goal::Full);
+            let own = Own {
+                scale: &scale,
+                recoil: &recoil,
+                films: false,
+            };
+            placed.recoil(&first, None, &own, Goal::Full);
             placed.check()?;
             row.push(placed.report().iterations.to_string());
         }

@@ -642,7 +642,7 @@ class Simulator:
     ) -> tuple[float, Gradient]:
         """Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is
         kept of the run: a rollout keeps some kilobytes a step, which is too much for 10⁵ steps and more. Parts of it run again, so it takes longer; the gradient is that of the
-        rollout, to the bit. `progress(done, total)` is called with the parts done, as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it."""
+        rollout, to rounding. `progress(done, total)` is called with the parts done, as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it."""
     def state(
         self,
         q: ArrayLike | None = None,

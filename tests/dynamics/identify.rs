@@ -243,6 +243,75 @@ fn what_nothing_tells_is_said() {
     assert!(made.weak[0].deviation.is_infinite() && made.weak[0].profile.is_empty());
 }
 
+/// What acts by rounding alone stays where it was, with an infinite error, and hinders no other: a coin that sinks flat, of which only the height is seen.
+#[test]
+fn rounding_tells_nothing() {
+    let coin = |mass: f64, damping: f64| {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.gravity = [0.0, 0.0, -9.81];
+        scene.time_step = 0.01;
+        let shape = Shape::ellipsoid([0.03, 0.03, 0.005]).faces(80);
+        scene.add(Body::new(shape).named("coin").mass(mass));
+        let water = Damping::new("coin").named("water");
+        scene.add_force(water.linear([1.0, 1.0, damping, 1e-3, 1e-3, 1e-3]).into());
+        Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap()
+    };
+    let truth = coin(0.03, 0.4);
+    let controls = Controls::zeros(&truth, 80);
+    let rollout = truth.rollout(&controls).unwrap();
+    let positions = rollout.observe("positions").unwrap();
+    let mut random = Samples::new(4);
+    let states: Vec<usize> = (1..=80).collect();
+    let noisy = |k: &usize| positions[(2, *k)] + 1e-4 * random.normal();
+    let values = states.iter().map(noisy).collect();
+    let seen = Recorded {
+        observable: "positions".into(),
+        entry: 2,
+        values,
+        states,
+        deviation: 1e-4,
+    };
+    let simulator = coin(0.03, 0.4);
+    let experiment = Experiment::new("fall", simulator, controls).saw(seen);
+    let known = || {
+        vec![
+            Unknown::new("coin.mass").positive().start(0.045),
+            Unknown::new("water.linear.z").positive().start(0.2),
+        ]
+    };
+    let settings = IdentifySettings::default();
+    let go = |_: &_| ControlFlow::Continue(());
+    let alone = identify(std::slice::from_ref(&experiment), &known(), &settings, go).unwrap();
+    for name in [
+        "coin.inertia.xx",
+        "coin.inertia.xy",
+        "coin.center_of_mass.x",
+    ] {
+        let mut all = known();
+        all.push(Unknown::new(name));
+        let made = identify(std::slice::from_ref(&experiment), &all, &settings, go).unwrap();
+        let [mass, damping, other] = &made.unknowns[..] else {
+            panic!("{made:?}")
+        };
+        println!(
+            "{name}: mass {:.4}, damping {:.3}, {} iterations, {:?}",
+            mass.value, damping.value, made.iterations, made.stop
+        );
+        assert!(
+            made.cost <= 1.001 * alone.cost,
+            "{name}: {} for {}",
+            made.cost,
+            alone.cost
+        );
+        assert_eq!(other.value, other.start, "{name}");
+        assert!(other.standard_error.is_infinite(), "{name}: {other:?}");
+        assert!(
+            mass.standard_error < 0.01 && damping.standard_error < 0.2,
+            "{made:?}"
+        );
+    }
+}
+
 /// An initial velocity that isn't what was said, found with the rest; values far off that a loss forgives.
 #[test]
 fn starts_and_outliers() {

@@ -295,6 +295,26 @@ fn primitives_are_their_own_mirror_images() {
     assert!((diagonal - Vec3::repeat(diagonal.mean())).amax() < 1e-15);
 }
 
+/// A cube stays one where a length comes of a sum, and what has a square side keeps it.
+#[test]
+fn lengths_that_differ_by_rounding_are_the_same() {
+    let a = 0.3 - 0.2;
+    assert!(a != 0.1);
+    for (rounded, right) in [
+        ([a, 0.1, 0.1], [0.1; 3]),
+        ([0.1, a, 0.02], [0.1, 0.1, 0.02]),
+    ] {
+        for faces in [80, 320, 1280] {
+            let [rounded, right] =
+                [rounded, right].map(|size| support::mesh(&Shape::cuboid(size), faces));
+            assert_eq!(rounded.faces(), right.faces());
+            for (x, y) in rounded.vertices().iter().zip(right.vertices()) {
+                assert!((x - y).norm() < 1e-15);
+            }
+        }
+    }
+}
+
 #[test]
 fn mass_properties_survive_distance_and_rotation() {
     let body = mesh("box:1,0.5,0.1", 300);

@@ -23,7 +23,8 @@ impl Axis {
     pub fn new(given: [f64; 3]) -> Self {
         Self {
             given,
-            unit: Vec3::from(given).normalize(),
+            // Scaled first: squares of lengths that their type allows may not be numbers.
+            unit: (Vec3::from(given) / Vec3::from(given).amax()).normalize(),
         }
     }
 }
@@ -100,5 +101,21 @@ impl JointMotion for Axial {
             given,
             remedy,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Axis, Vec3};
+
+    #[test]
+    fn lengths_of_axes_play_no_part() {
+        for length in [1e-300, 1e-160, 1.0, 1e160, 1e300] {
+            let axis = Axis::new([0.0, 3.0 * length, -4.0 * length]);
+            assert!(
+                (axis.unit - Vec3::new(0.0, 0.6, -0.8)).norm() < 1e-15,
+                "{length}"
+            );
+        }
     }
 }

@@ -163,7 +163,9 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             self.scale[i] = self.scale[i].max(jacobian.column(i).norm());
         }
         let mut delta = DVector::zeros(x.len());
+        let told = self.misfit.told(x, jacobian);
         let mut free: Vec<usize> = (0..x.len())
+            .filter(|&i| told[i])
             .filter(|&i| {
                 let [least, largest] = self.misfit.bounds(i);
                 !(x[i] <= least && gradient[i] > 0.0 || x[i] >= largest && gradient[i] < 0.0)

@@ -55,6 +55,9 @@ enum Place {
     Root { body: String, entry: usize },
 }
 
+/// Of what a change of a coordinate by its own size changes in the residuals, in that of the coordinate which they tell most of: what is less is rounding.
+const UNTOLD: f64 = 1e-12;
+
 /// A misfit: a function of the coordinates of the search, the unknowns' and then those of initial states.
 pub(super) struct Misfit<'a> {
     pub experiments: &'a [Experiment],
@@ -155,6 +158,27 @@ impl<'a> Misfit<'a> {
         let known = self.unknowns.iter().map(|u| u.start);
         let zeros = std::iter::repeat_n(0.0, self.coordinates - self.unknowns.len());
         DVector::from_iterator(self.coordinates, known.chain(zeros))
+    }
+
+    /// What changes of coordinates are parts of: their own, or what was known of them beforehand.
+    pub fn sizes(&self, x: &DVector<f64>) -> DVector<f64> {
+        DVector::from_fn(x.len(), |i, _| match self.unknowns.get(i) {
+            Some(u) if !u.by_logarithm => match u.prior {
+                Some(prior) => prior.deviation,
+                None if x[i] != 0.0 => x[i].abs(),
+                None => 1.0,
+            },
+            _ => 1.0,
+        })
+    }
+
+    /// Which coordinates the residuals tell something of. Of others the derivatives are rounding, by which no step can be found and no error told.
+    pub fn told(&self, x: &DVector<f64>, jacobian: &DMatrix<f64>) -> Vec<bool> {
+        let sizes = self.sizes(x);
+        let part = |i: usize| jacobian.column(i).norm() * sizes[i];
+        let parts: Vec<f64> = (0..x.len()).map(part).collect();
+        let most = parts.iter().copied().fold(0.0, f64::max);
+        parts.iter().map(|part| *part > UNTOLD * most).collect()
     }
 
     /// Least and largest value of a coordinate.

@@ -151,13 +151,13 @@ struct Known {
 }
 
 impl Known {
-    fn new(information: &DMatrix<f64>, held: &[bool], sizes: &DVector<f64>) -> Self {
+    fn new(information: &DMatrix<f64>, held: &[bool], told: &[bool], sizes: &DVector<f64>) -> Self {
         let n = sizes.len();
         let mut covariance = DMatrix::zeros(n, n);
         let mut directions = Vec::new();
         let (told, untold): (Vec<usize>, Vec<usize>) = (0..n)
             .filter(|i| !held[*i])
-            .partition(|i| information[(*i, *i)] > 0.0);
+            .partition(|i| told[*i] && information[(*i, *i)] > 0.0);
         for i in untold {
             covariance[(i, i)] = f64::INFINITY;
             let change = DVector::from_fn(n, |k, _| if k == i { sizes[i] } else { 0.0 });
@@ -232,17 +232,10 @@ pub(super) fn report(
     let held: Vec<bool> = (0..x.len())
         .map(|i| misfit.bounds(i).contains(&x[i]))
         .collect();
-    // What a deviation is a part of.
-    let sizes = DVector::from_fn(x.len(), |i, _| match misfit.unknowns.get(i) {
-        Some(u) if !u.by_logarithm => match u.prior {
-            Some(prior) => prior.deviation,
-            None if x[i] != 0.0 => x[i].abs(),
-            None => 1.0,
-        },
-        _ => 1.0,
-    });
-    let information = found.linear.jacobian.tr_mul(&found.linear.jacobian);
-    let known = Known::new(&information, &held, &sizes);
+    let jacobian = &found.linear.jacobian;
+    let information = jacobian.tr_mul(jacobian);
+    let told = misfit.told(x, jacobian);
+    let known = Known::new(&information, &held, &told, &misfit.sizes(x));
     let least = known.directions.iter().take(settings.profiles);
     let weak = least.map(|(change, deviation)| {
         let profile = match deviation.is_finite() {

@@ -38,13 +38,20 @@ fn face_count(cells: [usize; 3]) -> usize {
     side(cells[0], cells[1]) + side(cells[1], cells[2]) + side(cells[2], cells[0])
 }
 
+/// Part of the longest edge by which lengths may differ and have the same number of cells.
+const SAME: f64 = 1e-9;
+
 /// Numbers of cells along x, y, z: near-square cells, near the target; equal lengths get equal
 /// numbers, so that a cube stays one.
 fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
     let [a, b, c] = size;
     // Scaled by the longest edge first: lengths may be as extreme as their type allows.
     let longest = a.max(b).max(c);
-    let [a, b, c] = [a / longest, b / longest, c / longest];
+    let scaled = [a / longest, b / longest, c / longest];
+    // Lengths that differ by rounding are the same.
+    let first = |i: usize| (0..=i).find(|&j| (scaled[j] - scaled[i]).abs() <= SAME);
+    let alike = [0, 1, 2].map(|i| first(i).unwrap_or(i));
+    let [a, b, c] = alike.map(|i| scaled[i]);
     let mut ideal = (4.0 * (a * b + b * c + c * a) / target).sqrt();
     // Where a side is thinner than a cell it takes one all the same: so many more of them that cells must be longer.
     let least = |cell: f64| face_count([a, b, c].map(|l| (l / cell).max(1.0) as usize)) as f64;
@@ -59,8 +66,7 @@ fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
         for choice in 0..64usize {
             let cells = [0, 1, 2].map(|i| {
                 // The same length takes the same choice.
-                let digit = (0..=i).find(|&j| size[j] == size[i]).unwrap_or(i);
-                let offset = (choice >> (2 * digit)) & 3;
+                let offset = (choice >> (2 * alike[i])) & 3;
                 (exact[i] as usize + offset).saturating_sub(2).max(1)
             });
             let stretch = [0, 1, 2].map(|i| {

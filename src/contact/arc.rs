@@ -5,14 +5,12 @@
 //! nearest point of the border. Unlike the distance at the lowest place of the edge f has no kink where the edge crosses the middle of the body.
 
 use super::point::{ContactPoint, Slopes, carry, columns};
-use crate::geometry::convex::{Edge, Support, perpendicular};
+use crate::geometry::convex::{Edge, Support, perpendicular, rising_root};
 use hydrograd_adjoint::lie::{Mat3, Vec3, Vec6, skew};
 use std::f64::consts::PI;
 
 /// Angle between the normals at which tops are looked for first, rad.
 const STEP: f64 = 0.2;
-/// Rounds of Newton's method.
-const ROUNDS: usize = 60;
 /// Least curvature of f at a top, in sizes of the edge.
 const FLOOR: f64 = 1e-9;
 
@@ -93,27 +91,12 @@ impl<'e> Arc<'e> {
     }
 
     /// The top between an angle at which f rises and one at which it doesn't.
-    fn between(&self, mut low: f64, mut high: f64, outermost: &impl Fn(&Vec3) -> Support) -> Top {
-        let mut angle = 0.5 * (low + high);
-        for _ in 0..ROUNDS {
+    fn between(&self, low: f64, high: f64, outermost: &impl Fn(&Vec3) -> Support) -> Top {
+        let falls = |angle: f64| {
             let (_, slope, bend) = self.at(angle, outermost);
-            if slope > 0.0 {
-                low = angle;
-            } else {
-                high = angle;
-            }
-            let newton = angle - slope / bend;
-            let next = if newton >= low && newton <= high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            let step = (next - angle).abs();
-            angle = next;
-            if step <= 1e-16 {
-                break;
-            }
-        }
+            (-slope, -bend)
+        };
+        let angle = rising_root([low, high], 0.5 * (low + high), 1e-16, falls);
         self.at(angle, outermost).0
     }
 

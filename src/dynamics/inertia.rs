@@ -107,6 +107,7 @@ impl<'a> Evaluation<'a> {
             FluidMomenta::Apart(added) => Some(*added),
             FluidMomenta::Still => None,
             FluidMomenta::Scattered(at) => {
+                // Also where films weigh with them: it refuses what has no inertia by the joint's name.
                 let alone = self.factored_apart(free, Some(at.own()))?;
                 let own = match self.factored_filmed(free) {
                     Some(own) => own,
@@ -130,7 +131,6 @@ impl<'a> Evaluation<'a> {
     ) -> Result<DVector<f64>> {
         let factor = self.factored(free)?;
         let moved = driven.iter().any(|x| *x != 0.0);
-        let asked = right.clone();
         let v = match (&factor, &self.fluid) {
             (Inertia::Recoiling(many), FluidMomenta::Scattered(at)) => {
                 if moved {
@@ -148,7 +148,7 @@ impl<'a> Evaluation<'a> {
         self.check()?;
         // Of driven velocities what the others exchange isn't in what was asked.
         if !moved {
-            self.check_energy(&v, &asked)?;
+            self.check_energy(&v, &right)?;
         }
         Ok(v)
     }

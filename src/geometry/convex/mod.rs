@@ -24,7 +24,7 @@ pub(crate) use self::core::{Core, Edge, Face};
 pub(crate) use cylinder::{Cylinder, Disc};
 pub(crate) use ellipsoid::Ellipsoid;
 pub(crate) use field::{AtCorner, Field, across, perpendicular};
-pub(crate) use round::{Round, Support};
+pub(crate) use round::{Round, Support, rising_root};
 
 /// Most different directions of edges of either body that are held against one another in an overlap.
 const EDGES: usize = 40;

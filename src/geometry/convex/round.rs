@@ -49,6 +49,37 @@ pub(crate) trait Round {
     }
 }
 
+/// Where a function rises through zero between two places, from its value and slope: by Newton's method from `first` on, halving what is left where a step would leave it, until steps are no longer
+/// than `least`.
+pub(crate) fn rising_root(
+    [mut low, mut high]: [f64; 2],
+    first: f64,
+    least: f64,
+    f: impl Fn(f64) -> (f64, f64),
+) -> f64 {
+    let mut at = first;
+    for _ in 0..ROUNDS {
+        let (value, slope) = f(at);
+        if value > 0.0 {
+            high = at;
+        } else {
+            low = at;
+        }
+        let newton = at - value / slope;
+        let next = if newton >= low && newton <= high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        let step = (next - at).abs();
+        at = next;
+        if step <= least {
+            break;
+        }
+    }
+    at
+}
+
 /// Where the signed distance from a convex body is least along an edge: how far from its beginning, m, looked for from
 /// `first` on; none at an end, unless it is level there. It is convex, so its slope along the edge has one root at most.
 pub(super) fn lowest(
@@ -73,26 +104,5 @@ pub(super) fn lowest(
     if ends[0].0 >= 0.0 || ends[1].0 <= 0.0 {
         return None;
     }
-    let (mut low, mut high) = (0.0, length);
-    let mut s = first;
-    for _ in 0..ROUNDS {
-        let (value, curvature) = slope(s);
-        if value > 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let newton = s - value / curvature;
-        let next = if newton >= low && newton <= high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        let step = (next - s).abs();
-        s = next;
-        if step <= 1e-15 * length {
-            break;
-        }
-    }
-    Some(s)
+    Some(rising_root([0.0, length], first, 1e-15 * length, slope))
 }

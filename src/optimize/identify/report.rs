@@ -155,9 +155,8 @@ impl Known {
         let n = sizes.len();
         let mut covariance = DMatrix::zeros(n, n);
         let mut directions = Vec::new();
-        let (told, untold): (Vec<usize>, Vec<usize>) = (0..n)
-            .filter(|i| !held[*i])
-            .partition(|i| told[*i] && information[(*i, *i)] > 0.0);
+        let (told, untold): (Vec<usize>, Vec<usize>) =
+            (0..n).filter(|i| !held[*i]).partition(|i| told[*i]);
         for i in untold {
             covariance[(i, i)] = f64::INFINITY;
             let change = DVector::from_fn(n, |k, _| if k == i { sizes[i] } else { 0.0 });

@@ -5,6 +5,9 @@
 
 use crate::lie::{Mat3, Pose, Vec3};
 
+/// Part of a hull's largest coordinate by which its height along a normal may be off.
+const ROUNDING: f64 = 1e-12;
+
 /// A closed surface, its faces counter-clockwise from outside.
 #[derive(Clone, Debug, Default)]
 pub struct Hull {
@@ -14,7 +17,7 @@ pub struct Hull {
     pub faces: Vec<[usize; 3]>,
 }
 
-/// What lies below a plane.
+/// What lies below a plane. A plane through the highest corner has all below it, one through the lowest nothing, both without a cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Below {
     /// Volume V, m³.
@@ -32,13 +35,26 @@ pub struct Below {
 impl Below {
     /// Of a hull below the plane `normal`·x = `height`; `normal` is a unit vector.
     pub fn new(hull: &Hull, normal: &Vec3, height: f64) -> Self {
-        // A plane far above would lose digits, and one through the highest point says the same.
-        let top = hull.vertices.iter().map(|x| normal.dot(x));
-        let origin = top.fold(f64::NEG_INFINITY, f64::max).min(height) * normal;
+        let heights = hull.vertices.iter().map(|x| normal.dot(x));
+        let (bottom, top) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
+            (low.min(h), high.max(h))
+        });
+        let size = hull.vertices.iter().fold(0.0_f64, |m, x| m.max(x.amax()));
+        // A level face that the plane doesn't reach is no cut, on whichever side rounding has its corners.
+        let rounding = ROUNDING * size;
         let mut out = Self::default();
+        if height <= bottom + rounding {
+            return out;
+        }
+        let whole = height >= top - rounding;
+        // A plane far above would lose digits, and one through the highest point says the same.
+        let origin = top.min(height) * normal;
         for face in &hull.faces {
             let corners = face.map(|k| hull.vertices[k] - origin);
-            let depths = corners.map(|x| -normal.dot(&x));
+            let depths = match whole {
+                true => [0.0; 3],
+                false => corners.map(|x| -normal.dot(&x)),
+            };
             out.add_face(&corners, &depths, normal);
         }
         out.about(&origin)
@@ -141,6 +157,33 @@ mod tests {
         Hull {
             vertices: (0..8).map(corner).collect(),
             faces: faces.collect(),
+        }
+    }
+
+    /// The slope of what is below is none where all is, or nothing, however a level face is rounded.
+    #[test]
+    fn a_level_face_out_of_reach_is_no_cut() {
+        let hull = cuboid([0.3, 0.2, 0.1]);
+        for k in 0..40 {
+            let turn = nalgebra::Rotation3::new(Vec3::new(0.37, -0.2, 0.1) * f64::from(k));
+            let turned = Hull {
+                vertices: hull.vertices.iter().map(|x| turn * x).collect(),
+                faces: hull.faces.clone(),
+            };
+            let normal = turn * Vec3::z();
+            for (height, volume) in [
+                (0.1, 0.048),
+                (0.1 + 1e-9, 0.048),
+                (50.0, 0.048),
+                (-0.1, 0.0),
+            ] {
+                let found = Below::new(&turned, &normal, height);
+                assert!(
+                    (found.volume - volume).abs() < 1e-15,
+                    "{k} {height}: {found:?}"
+                );
+                assert_eq!((found.area, found.area_moment.norm()), (0.0, 0.0));
+            }
         }
     }
 

@@ -605,8 +605,9 @@ class Simulator:
         forces of actuated joints and wrenches on bodies, N and N m, and commands of thrusters. Without them, `steps` (default: the scene's) without
         control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
 
-        `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
-        with the rollout of the steps that were made as its `rollout`."""
+        `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out.
+        An error that ends the run has the rollout of the steps that were made as its `rollout`, whether progress raised it or a step did; the latter's has
+        the `step` and the `time` (s) as well."""
     def rollout_batch(
         self,
         controls: ArrayLike,
@@ -1361,7 +1362,7 @@ def identify(
     *,
     loss: tuple[Literal["huber", "cauchy"], float] | None = None,
     iterations: int = 50,
-    damping: float = 1e-3,
+    damping: float = 1e-6,
     cost_tolerance: float = 1e-8,
     step_tolerance: float = 1e-3,
     profiles: int = 1,

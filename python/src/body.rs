@@ -142,6 +142,25 @@ enum Parent {
     Name(String),
 }
 
+/// The items of a list, or nothing of None; what isn't one of them, or no list, is an `InputError` of `place`.
+fn items<'py, T>(place: &str, given: Option<&Bound<'py, PyAny>>, expected: &str) -> PyResult<Vec<T>>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    let Some(given) = given else {
+        return Ok(Vec::new());
+    };
+    let shown = |x: &Bound<'py, PyAny>| x.repr().map(|r| r.to_string()).unwrap_or_default();
+    let each = |(k, item): (usize, PyResult<Bound<'py, PyAny>>)| {
+        let item = item?;
+        let refuse = |_| input(format!("{place}[{k}]"), shown(&item), expected);
+        item.extract::<T>().map_err(Into::into).map_err(refuse)
+    };
+    let list = given.try_iter();
+    let list = list.map_err(|_: PyErr| input(place, shown(given), "must be a list"))?;
+    list.enumerate().map(each).collect()
+}
+
 #[derive(FromPyObject)]
 struct Ball<'py>(Bound<'py, PyAny>, f64, f64);
 
@@ -195,7 +214,7 @@ impl Body {
         position: Option<&Bound<'_, PyAny>>,
         rotation: Option<&Bound<'_, PyAny>>,
         joint: Option<PyRef<'_, Joint>>,
-        parent: Option<Parent>,
+        parent: Option<&Bound<'_, PyAny>>,
         actuated: bool,
         thruster: bool,
         locked: bool,
@@ -205,10 +224,10 @@ impl Body {
         drag: Option<PyRef<'_, Drag>>,
         shape_position: Option<&Bound<'_, PyAny>>,
         shape_rotation: Option<&Bound<'_, PyAny>>,
-        refine: Option<Vec<Ball<'_>>>,
+        refine: Option<&Bound<'_, PyAny>>,
         added_mass: Option<&Bound<'_, PyAny>>,
         overlaps_parent: bool,
-        collision: Option<Vec<Piece<'_>>>,
+        collision: Option<&Bound<'_, PyAny>>,
         passive: Option<PyRef<'_, Passive>>,
         mimic: Option<PyRef<'_, Mimic>>,
         servo: Option<PyRef<'_, Servo>>,
@@ -234,19 +253,39 @@ impl Body {
             let rows = array::array(&at("added_mass"), given, &[Dim::Is(6), Dim::Is(6)])?;
             PyResult::Ok(rows.values.chunks(6).map(<[f64]>::to_vec).collect())
         });
-        let refine = refine.iter().flatten().map(|Ball(center, radius, edge)| {
+        let balls = "must be (center, radius, edge), m";
+        let refine: Vec<Ball<'_>> = items(&at("refine"), refine, balls)?;
+        let refine = refine.iter().map(|Ball(center, radius, edge)| {
             Ok(Refinement {
                 center: fixed(&at("refine: center"), center)?,
                 radius: *radius,
                 edge: *edge,
             })
         });
-        let collision = collision.iter().flatten().enumerate();
-        let collision = collision.map(|(k, piece)| piece.made(&at(&format!("collision[{k}]"))));
+        let kinds = "must be a shape, (shape, position) or (shape, position, rotation)";
+        let pieces: Vec<Piece<'_>> = items(&at("collision"), collision, kinds)?;
+        if collision.is_some() && pieces.is_empty() {
+            return Err(input(
+                at("collision"),
+                "no pieces",
+                "give some, or leave it out: the body is then its shape for contact",
+            ));
+        }
+        let collision = pieces
+            .iter()
+            .enumerate()
+            .map(|(k, piece)| piece.made(&at(&format!("collision[{k}]"))));
         let optional = |field: &str, given: Option<&Bound<'_, PyAny>>| {
             given.map(|g| fixed(&at(field), g)).transpose()
         };
-        let (number, parent) = match parent {
+        let parent = parent.map(|given| {
+            given.extract().map_err(|_: PyErr| {
+                let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
+                let expected = "must be the name of a body, or its number, counted from 0";
+                input(at("parent"), shown, expected)
+            })
+        });
+        let (number, parent) = match parent.transpose()? {
             Some(Parent::Number(number)) => (Some(number), None),
             Some(Parent::Name(name)) => (None, Some(name)),
             None => (None, None),

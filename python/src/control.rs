@@ -2,7 +2,7 @@
 
 use crate::array::{self, Dim, array};
 use crate::cost::CostTerm;
-use crate::error::{input, internal};
+use crate::error::{counts, input, internal};
 use crate::interrupt::{Interrupt, Progress, Told, followed, lock, long, short};
 use crate::optimize::class;
 use crate::rollout::Rollout;
@@ -198,19 +198,19 @@ pub fn ilqr<'py>(
     py: Python<'py>,
     simulator: &Bound<'py, Simulator>,
     cost: Vec<PyRef<'py, CostTerm>>,
-    knots: usize,
-    hold: usize,
+    #[pyo3(from_py_with = counts::knots)] knots: usize,
+    #[pyo3(from_py_with = counts::hold)] hold: usize,
     lower: Option<&Bound<'py, PyAny>>,
     upper: Option<&Bound<'py, PyAny>>,
     previous: Option<&Bound<'py, PyAny>>,
     state: Option<&Bound<'py, State>>,
     guess: Option<&Bound<'py, PyAny>>,
-    shift: usize,
-    iterations: usize,
+    #[pyo3(from_py_with = counts::shift)] shift: usize,
+    #[pyo3(from_py_with = counts::iterations)] iterations: usize,
     tolerance: f64,
     target: Option<f64>,
     regularisation: f64,
-    trials: usize,
+    #[pyo3(from_py_with = counts::trials)] trials: usize,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let me = simulator.get();
@@ -354,17 +354,17 @@ impl Mpc {
     fn new(
         model: &Bound<'_, Simulator>,
         cost: Vec<PyRef<'_, CostTerm>>,
-        knots: usize,
-        hold: usize,
+        #[pyo3(from_py_with = counts::knots)] knots: usize,
+        #[pyo3(from_py_with = counts::hold)] hold: usize,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
         previous: Option<&Bound<'_, PyAny>>,
-        every: usize,
-        iterations: usize,
-        first_iterations: usize,
+        #[pyo3(from_py_with = counts::every)] every: usize,
+        #[pyo3(from_py_with = counts::iterations)] iterations: usize,
+        #[pyo3(from_py_with = counts::first_iterations)] first_iterations: usize,
         feedback: bool,
         tolerance: f64,
-        trials: usize,
+        #[pyo3(from_py_with = counts::trials)] trials: usize,
     ) -> PyResult<Self> {
         let problem = problem("mpc", cost, knots, hold, lower, upper, previous)?;
         let base = MpcSettings::default();
@@ -465,7 +465,7 @@ impl Mpc {
     fn run<'py>(
         &self,
         plant: &Bound<'py, Simulator>,
-        steps: usize,
+        #[pyo3(from_py_with = counts::steps)] steps: usize,
         state: Option<&Bound<'py, State>>,
         cost: Option<Vec<PyRef<'py, CostTerm>>>,
         progress: Option<&Bound<'py, PyAny>>,

@@ -1,7 +1,7 @@
 //! Terms of the cost of optimal control.
 
 use crate::array::{self, Dim, array};
-use crate::error::input;
+use crate::error::{counts, input};
 use crate::nested::ask;
 use hydrograd::optimize::{CostPoint, CustomCost, Quadratic, Target, Term, Weights, terms};
 use hydrograd::{Error, Result};
@@ -145,7 +145,7 @@ impl CostTerm {
     #[pyo3(signature = (name, entries, target, weights, *, times=None, last=false))]
     fn observable(
         name: String,
-        entries: Vec<usize>,
+        #[pyo3(from_py_with = counts::lists::entries)] entries: Vec<usize>,
         target: &Bound<'_, PyAny>,
         weights: &Bound<'_, PyAny>,
         times: Option<&Bound<'_, PyAny>>,

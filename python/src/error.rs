@@ -170,25 +170,72 @@ pub mod counts {
     use super::input;
     use pyo3::prelude::*;
 
-    fn count(keyword: &str, given: &Bound<'_, PyAny>) -> PyResult<usize> {
-        given.extract::<usize>().map_err(|_| {
+    fn count<'py, T: FromPyObjectOwned<'py>>(
+        keyword: &str,
+        given: &Bound<'py, PyAny>,
+    ) -> PyResult<T> {
+        given.extract::<T>().map_err(|_| {
             let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
             input(keyword, shown, "must be a whole number that isn't negative")
         })
     }
 
     macro_rules! keywords {
-        (required: $($required:ident),*; optional: $($optional:ident),*) => {
-            $(pub fn $required(given: &Bound<'_, PyAny>) -> PyResult<usize> {
-                count(stringify!($required), given)
-            })*
-            $(pub fn $optional(given: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-                let some = (!given.is_none()).then(|| count(stringify!($optional), given));
-                some.transpose()
+        ($($keyword:ident: $number:ty),*) => {
+            $(pub fn $keyword(given: &Bound<'_, PyAny>) -> PyResult<$number> {
+                count(stringify!($keyword), given)
             })*
         };
     }
-    keywords!(required: step, mode, directions; optional: faces, rank, steps);
+    keywords!(
+        directions: usize, entry: usize, evaluations: usize, every: usize, first_iterations: usize, hold: usize, index: usize, iterations: usize,
+        knots: usize, memory: usize, mode: usize, most_steps: usize, profiles: usize, seed: u64, shift: usize, step: usize, steps: usize, trials: usize
+    );
+
+    /// Those that may be left out.
+    pub mod optional {
+        use super::*;
+
+        macro_rules! keywords {
+            ($($keyword:ident),*) => {
+                $(pub fn $keyword(given: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+                    let some = (!given.is_none()).then(|| count(stringify!($keyword), given));
+                    some.transpose()
+                })*
+            };
+        }
+        keywords!(
+            evaluations,
+            faces,
+            knots,
+            pushes,
+            rank,
+            reference_faces,
+            search,
+            starts,
+            steps
+        );
+    }
+
+    /// Lists of them; None is an empty one.
+    pub mod lists {
+        use super::*;
+
+        macro_rules! keywords {
+            ($($keyword:ident),*) => {
+                $(pub fn $keyword(given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+                    let each = |(k, one): (usize, PyResult<Bound<'_, PyAny>>)| {
+                        count(&format!("{}[{k}]", stringify!($keyword)), &one?)
+                    };
+                    if given.is_none() {
+                        return Ok(Vec::new());
+                    }
+                    given.try_iter()?.enumerate().map(each).collect()
+                })*
+            };
+        }
+        keywords!(entries, faces, ranks);
+    }
 }
 
 /// An `InternalError`: what a panic said.

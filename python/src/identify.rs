@@ -100,7 +100,7 @@ impl Experiment {
     fn new(
         name: &str,
         simulator: &Bound<'_, Simulator>,
-        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
+        #[pyo3(from_py_with = counts::optional::steps)] steps: Option<usize>,
         controls: Option<&Bound<'_, PyAny>>,
         start_within: Option<(f64, f64)>,
     ) -> PyResult<Self> {
@@ -291,7 +291,7 @@ fn loss(given: Option<(String, f64)>) -> PyResult<Loss> {
 /// misfit is simulated. `progress(p)` is called after every iteration with an `IdentifyProgress`; where it gives True the best so far is what is found. Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
-    experiments, unknowns, *, loss=None, iterations=50, damping=1e-3, cost_tolerance=1e-8, step_tolerance=1e-3, profiles=1, progress=None
+    experiments, unknowns, *, loss=None, iterations=50, damping=1e-6, cost_tolerance=1e-8, step_tolerance=1e-3, profiles=1, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "one per keyword")]
 fn identify<'py>(
@@ -299,11 +299,11 @@ fn identify<'py>(
     experiments: Vec<PyRef<'py, Experiment>>,
     unknowns: Vec<PyRef<'py, Unknown>>,
     loss: Option<(String, f64)>,
-    iterations: usize,
+    #[pyo3(from_py_with = counts::iterations)] iterations: usize,
     damping: f64,
     cost_tolerance: f64,
     step_tolerance: f64,
-    profiles: usize,
+    #[pyo3(from_py_with = counts::profiles)] profiles: usize,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let settings = IdentifySettings {

@@ -1,7 +1,7 @@
 //! Objectives: weighted sums of terms of a trajectory.
 
 use crate::array::fixed;
-use crate::error::input;
+use crate::error::{counts, input};
 use crate::flow::{sensor, which};
 use hydrograd::objective::{self, Sum};
 use pyo3::prelude::*;
@@ -80,14 +80,22 @@ fn mean_position(body: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult
 /// `weight · (q[index] − target)²` at the end, for a coordinate of a prismatic, revolute or planar joint (m or rad).
 #[pyfunction]
 #[pyo3(signature = (index, target, weight=1.0))]
-fn final_coordinate(index: usize, target: f64, weight: f64) -> Objective {
+fn final_coordinate(
+    #[pyo3(from_py_with = counts::index)] index: usize,
+    target: f64,
+    weight: f64,
+) -> Objective {
     Objective(objective::final_coordinate(index, target, weight))
 }
 
 /// `weight · (v[index] − target)²` at the end (m/s or rad/s).
 #[pyfunction]
 #[pyo3(signature = (index, target, weight=1.0))]
-fn final_velocity(index: usize, target: f64, weight: f64) -> Objective {
+fn final_velocity(
+    #[pyo3(from_py_with = counts::index)] index: usize,
+    target: f64,
+    weight: f64,
+) -> Objective {
     Objective(objective::final_velocity(index, target, weight))
 }
 
@@ -95,14 +103,24 @@ fn final_velocity(index: usize, target: f64, weight: f64) -> Objective {
 /// it; the observable must have a transpose.
 #[pyfunction]
 #[pyo3(signature = (name, entry, target, weight=1.0))]
-fn final_observable(name: &str, entry: usize, target: f64, weight: f64) -> Objective {
+fn final_observable(
+    name: &str,
+    #[pyo3(from_py_with = counts::entry)] entry: usize,
+    target: f64,
+    weight: f64,
+) -> Objective {
     Objective(objective::final_observable(name, entry, target, weight))
 }
 
 /// The mean of `weight · (x − target)²` over all states, x as in `final_observable`.
 #[pyfunction]
 #[pyo3(signature = (name, entry, target, weight=1.0))]
-fn mean_observable(name: &str, entry: usize, target: f64, weight: f64) -> Objective {
+fn mean_observable(
+    name: &str,
+    #[pyo3(from_py_with = counts::entry)] entry: usize,
+    target: f64,
+    weight: f64,
+) -> Objective {
     Objective(objective::mean_observable(name, entry, target, weight))
 }
 

@@ -1,7 +1,7 @@
 //! Descents and the recipe for grasps.
 
 use crate::array::{self, Dim, array};
-use crate::error::{input, own};
+use crate::error::{counts, input, own};
 use crate::interrupt::{Interrupt, long};
 use crate::nested::ask;
 use crate::rollout::Rollout;
@@ -140,9 +140,9 @@ macro_rules! descent {
             py: Python<'py>,
             function: &Bound<'py, PyAny>,
             $($given: &Bound<'py, PyAny>,)*
-            iterations: usize,
-            evaluations: usize,
-            memory: usize,
+            #[pyo3(from_py_with = counts::iterations)] iterations: usize,
+            #[pyo3(from_py_with = counts::evaluations)] evaluations: usize,
+            #[pyo3(from_py_with = counts::memory)] memory: usize,
             first_step: Option<f64>,
             gradient_tolerance: f64,
             cost_tolerance: f64,
@@ -205,8 +205,8 @@ fn smoothed<'py>(
     function: &Bound<'py, PyAny>,
     x: &Bound<'py, PyAny>,
     spread: f64,
-    directions: usize,
-    seed: u64,
+    #[pyo3(from_py_with = counts::directions)] directions: usize,
+    #[pyo3(from_py_with = counts::seed)] seed: u64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let x = array::row("smoothed: x", x)?;
     let smoothing = Smoothing {
@@ -276,14 +276,14 @@ fn grasp<'py>(
     closing: &Bound<'py, PyAny>,
     limits: &Bound<'py, PyAny>,
     hold: f64,
-    knots: Option<usize>,
-    pushes: Option<usize>,
-    starts: Option<usize>,
-    evaluations: Option<usize>,
+    #[pyo3(from_py_with = counts::optional::knots)] knots: Option<usize>,
+    #[pyo3(from_py_with = counts::optional::pushes)] pushes: Option<usize>,
+    #[pyo3(from_py_with = counts::optional::starts)] starts: Option<usize>,
+    #[pyo3(from_py_with = counts::optional::evaluations)] evaluations: Option<usize>,
     softness: Option<Vec<f64>>,
     target: Option<f64>,
-    search: Option<usize>,
-    seed: u64,
+    #[pyo3(from_py_with = counts::optional::search)] search: Option<usize>,
+    #[pyo3(from_py_with = counts::seed)] seed: u64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let simulator = match simulator.cast::<Scene>() {
         Ok(scene) => &py.get_type::<Simulator>().call1((scene,))?,

@@ -2,7 +2,7 @@
 
 use crate::array::{self, Dim};
 use crate::contact;
-use crate::error::{in_order, input};
+use crate::error::{counts, in_order, input};
 use crate::flow;
 use crate::gradient;
 use crate::interrupt::{Progress, ended, followed, light, long, short};
@@ -373,7 +373,7 @@ impl Rollout {
         way: &str,
         within: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
         tolerance: Option<f64>,
-        most_steps: usize,
+        #[pyo3(from_py_with = counts::most_steps)] most_steps: usize,
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let drawn = flow::Drawn {
             length,

@@ -2,7 +2,7 @@
 
 use crate::array::{fixed, or_zeros, row};
 use crate::body::Body;
-use crate::error::{OrRaise, exception, input};
+use crate::error::{OrRaise, counts, exception, input};
 use crate::fluid::{Contact, Fluid};
 use crate::interrupt::light;
 use crate::joint::Motion;
@@ -51,7 +51,7 @@ impl Scene {
         gravity: Option<&Bound<'_, PyAny>>,
         contact: Option<PyRef<'_, Contact>>,
         time_step: f64,
-        steps: usize,
+        #[pyo3(from_py_with = counts::steps)] steps: usize,
         waterline: Option<f64>,
     ) -> PyResult<Self> {
         let fluid = fluid.map_or_else(hydrograd::Fluid::fresh_water, |f| f.0);

@@ -1,7 +1,7 @@
 //! Shapes, by formula, from files and from arrays.
 
 use crate::array::{self, Dim};
-use crate::error::{OrRaise, input};
+use crate::error::{OrRaise, counts, input};
 use crate::interrupt::short;
 use crate::mesh::{Triangles, triangles};
 use hydrograd::{MassProperties, TriMesh, shape};
@@ -60,42 +60,67 @@ fn with_faces(shape: hydrograd::Shape, faces: Option<usize>) -> PyResult<Shape> 
 /// A sphere: radius in m. `faces` is the number of triangles wanted (default 1280), here and for the other shapes.
 #[pyfunction]
 #[pyo3(signature = (radius, *, faces=None))]
-fn sphere(radius: f64, faces: Option<usize>) -> PyResult<Shape> {
+fn sphere(
+    radius: f64,
+    #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
+) -> PyResult<Shape> {
     with_faces(hydrograd::Shape::sphere(radius), faces)
 }
 
 /// An ellipsoid with the semi-axes a, b and c along x, y and z, in m.
 #[pyfunction]
 #[pyo3(signature = (a, b, c, *, faces=None))]
-fn ellipsoid(a: f64, b: f64, c: f64, faces: Option<usize>) -> PyResult<Shape> {
+fn ellipsoid(
+    a: f64,
+    b: f64,
+    c: f64,
+    #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
+) -> PyResult<Shape> {
     with_faces(hydrograd::Shape::ellipsoid([a, b, c]), faces)
 }
 
 /// A box with the edges x, y and z, in m.
 #[pyfunction(name = "box")]
 #[pyo3(signature = (x, y, z, *, faces=None))]
-fn cuboid(x: f64, y: f64, z: f64, faces: Option<usize>) -> PyResult<Shape> {
+fn cuboid(
+    x: f64,
+    y: f64,
+    z: f64,
+    #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
+) -> PyResult<Shape> {
     with_faces(hydrograd::Shape::cuboid([x, y, z]), faces)
 }
 
 /// A cylinder along z: radius and length in m.
 #[pyfunction]
 #[pyo3(signature = (radius, length, *, faces=None))]
-fn cylinder(radius: f64, length: f64, faces: Option<usize>) -> PyResult<Shape> {
+fn cylinder(
+    radius: f64,
+    length: f64,
+    #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
+) -> PyResult<Shape> {
     with_faces(hydrograd::Shape::cylinder(radius, length), faces)
 }
 
 /// A capsule along z: radius, and length without its round ends, in m.
 #[pyfunction]
 #[pyo3(signature = (radius, length, *, faces=None))]
-fn capsule(radius: f64, length: f64, faces: Option<usize>) -> PyResult<Shape> {
+fn capsule(
+    radius: f64,
+    length: f64,
+    #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
+) -> PyResult<Shape> {
     with_faces(hydrograd::Shape::capsule(radius, length), faces)
 }
 
 /// A prism along x: corners (n, 2) of its convex profile in the y-z plane, and its length, in m.
 #[pyfunction]
 #[pyo3(signature = (profile, length, *, faces=None))]
-fn prism(profile: &Bound<'_, PyAny>, length: f64, faces: Option<usize>) -> PyResult<Shape> {
+fn prism(
+    profile: &Bound<'_, PyAny>,
+    length: f64,
+    #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
+) -> PyResult<Shape> {
     let found = array::array(
         "prism: profile",
         profile,

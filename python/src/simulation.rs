@@ -170,9 +170,9 @@ impl Simulator {
         method: Option<&str>,
         tolerance: Option<f64>,
         integrator: Option<&str>,
-        #[pyo3(from_py_with = counts::faces)] faces: Option<usize>,
+        #[pyo3(from_py_with = counts::optional::faces)] faces: Option<usize>,
         accuracy: Option<f64>,
-        #[pyo3(from_py_with = counts::rank)] rank: Option<usize>,
+        #[pyo3(from_py_with = counts::optional::rank)] rank: Option<usize>,
         resolved_gap: Option<f64>,
         films: Option<bool>,
         exchange: Option<&str>,
@@ -204,13 +204,14 @@ impl Simulator {
     /// forces of actuated joints and wrenches on bodies, N and N m, and commands of thrusters. Without them, `steps` (default: the scene's) without
     /// control. It begins where the simulator does unless given a `state`, or `q` (q_size,) and `v` (v_size,). Ctrl-C ends it.
     ///
-    /// `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out,
-    /// with the rollout of the steps that were made as its `rollout`.
+    /// `progress(done, total)` is called with the steps made, at most twenty times a second and once at the end. What it raises ends the run and comes out.
+    /// An error that ends the run has the rollout of the steps that were made as its `rollout`, whether progress raised it or a step did; the latter's has
+    /// the `step` and the `time` (s) as well.
     #[pyo3(signature = (controls=None, *, steps=None, state=None, q=None, v=None, progress=None))]
     fn rollout(
         slf: &Bound<'_, Self>,
         controls: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
+        #[pyo3(from_py_with = counts::optional::steps)] steps: Option<usize>,
         state: Option<&Bound<'_, State>>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
@@ -227,19 +228,26 @@ impl Simulator {
             let state = start.state(&inner)?;
             Ok(inner.rollout_as_far(&state, &controls, |done| interrupt.at(done)))
         })?;
-        if let Some(raised) = progress.and_then(|progress| progress.raised) {
-            let partial = match made {
-                Ok(rollout) => Some(rollout),
-                Err(halted) => halted.rollout,
-            };
+        let with = |raised: PyErr, partial: Option<hydrograd::Rollout>| -> PyResult<PyErr> {
             if let Some(partial) = partial {
                 // Where an exception takes no attributes it comes out without.
                 let partial = Bound::new(py, Rollout::new(slf, partial))?;
                 let _ = raised.value(py).setattr("rollout", partial);
             }
-            return Err(raised);
-        }
-        let made = made.map_err(|halted| halted.error).or_raise()?;
+            Ok(raised)
+        };
+        let made = match (progress.and_then(|progress| progress.raised), made) {
+            (Some(raised), Ok(rollout)) => return Err(with(raised, Some(rollout))?),
+            (Some(raised), Err(halted)) => return Err(with(raised, halted.rollout)?),
+            (None, Ok(rollout)) => rollout,
+            (None, Err(halted)) => {
+                let raised = exception(halted.error);
+                let value = raised.value(py);
+                let _ = value.setattr("step", halted.step);
+                let _ = value.setattr("time", halted.time);
+                return Err(with(raised, halted.rollout)?);
+            }
+        };
         log::done(py, started, || format!("rollout: {steps} steps"))?;
         log::warnings(py, "rollout", || made.warnings())?;
         Ok(Rollout::new(slf, made))
@@ -400,7 +408,7 @@ impl Simulator {
         py: Python<'py>,
         objective: PyRef<'_, Objective>,
         controls: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
+        #[pyo3(from_py_with = counts::optional::steps)] steps: Option<usize>,
         memory: f64,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(f64, Bound<'py, PyAny>)> {
@@ -526,7 +534,7 @@ impl Simulator {
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
         u: Option<&Bound<'_, PyAny>>,
-        step: usize,
+        #[pyo3(from_py_with = counts::step)] step: usize,
     ) -> PyResult<Bound<'py, PyTuple>> {
         self.linearised(py, [q, v, u], step)
     }
@@ -539,9 +547,9 @@ impl Simulator {
     fn gradcheck<'py>(
         &self,
         py: Python<'py>,
-        #[pyo3(from_py_with = counts::steps)] steps: Option<usize>,
+        #[pyo3(from_py_with = counts::optional::steps)] steps: Option<usize>,
         #[pyo3(from_py_with = counts::directions)] directions: usize,
-        seed: u64,
+        #[pyo3(from_py_with = counts::seed)] seed: u64,
     ) -> PyResult<Bound<'py, PyAny>> {
         crate::gradcheck::check(
             py,

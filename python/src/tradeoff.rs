@@ -1,6 +1,6 @@
 //! Time against error for Python: an instance of the data class in `hydrograd/_tradeoff.py`.
 
-use crate::error::internal;
+use crate::error::{counts, internal};
 use crate::interrupt::long;
 use crate::scene::{Scene, copied};
 use crate::settings::named;
@@ -30,7 +30,7 @@ fn all<T: VariantArray + FromStr + Into<&'static str> + Copy>(
 /// takes the time it needs. Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
-    scene, *, fidelities=None, methods=None, faces=None, ranks=None, accuracies=None, tolerances=None, integrators=None,
+    scene, *, fidelities=None, methods=None, faces=Vec::new(), ranks=Vec::new(), accuracies=None, tolerances=None, integrators=None,
     time_steps=None, full_product=false, steps=None, reference_faces=None, budget=120.0
 ))]
 #[expect(clippy::too_many_arguments, reason = "one per keyword")]
@@ -39,22 +39,22 @@ pub fn tradeoff<'py>(
     scene: &Bound<'py, Scene>,
     fidelities: Option<Vec<String>>,
     methods: Option<Vec<String>>,
-    faces: Option<Vec<usize>>,
-    ranks: Option<Vec<usize>>,
+    #[pyo3(from_py_with = counts::lists::faces)] faces: Vec<usize>,
+    #[pyo3(from_py_with = counts::lists::ranks)] ranks: Vec<usize>,
     accuracies: Option<Vec<f64>>,
     tolerances: Option<Vec<f64>>,
     integrators: Option<Vec<String>>,
     time_steps: Option<Vec<f64>>,
     full_product: bool,
-    steps: Option<usize>,
-    reference_faces: Option<usize>,
+    #[pyo3(from_py_with = counts::optional::steps)] steps: Option<usize>,
+    #[pyo3(from_py_with = counts::optional::reference_faces)] reference_faces: Option<usize>,
     budget: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let settings = TradeoffSettings {
         fidelities: all("fidelities", fidelities)?,
         methods: all("methods", methods)?,
-        faces: faces.unwrap_or_default(),
-        ranks: ranks.unwrap_or_default(),
+        faces,
+        ranks,
         accuracies: accuracies.unwrap_or_default(),
         tolerances: tolerances.unwrap_or_default(),
         integrators: all("integrators", integrators)?,

@@ -242,9 +242,49 @@ def test_counts_that_are_none(sim):
         ("step", lambda: sim.state(step=-1)),
         ("faces", lambda: hg.Simulator(sim.scene, faces=-1)),
         ("rank", lambda: hg.Simulator(sim.scene, rank=-3)),
+        ("steps", lambda: hg.Scene(steps=-1)),
+        ("faces", lambda: hg.sphere(1.0, faces=-1)),
+        ("shift", lambda: hg.optimize.ilqr(sim, [hg.cost.effort(1.0)], knots=2, shift=-1)),
+        ("index", lambda: hg.objective.final_velocity(-1, 0.0)),
+        (r"entries\[1\]", lambda: hg.cost.observable("positions", [0, -1], [0.0, 0.0], 1.0)),
+        (r"ranks\[0\]", lambda: hg.tradeoff(sim.scene, ranks=[2.5])),
     ):
         with pytest.raises(hg.InputError, match=f"^{name}: .*whole number that isn't negative"):
             call()
+
+
+def test_lists_of_a_body():
+    shape = hg.box(0.1, 0.1, 0.1)
+    for given, says in (
+        ({"parent": -1}, "parent: got -1; must be the name of a body, or its number"),
+        ({"collision": [shape, 3]}, r"collision\[1\]: got 3; must be a shape"),
+        ({"collision": [(shape,)]}, r"collision\[0\]: .*must be a shape"),
+        ({"collision": shape}, "collision: .*must be a list"),
+        ({"collision": []}, "collision: got no pieces; give some, or leave it out"),
+        ({"refine": [(1, 2)]}, r"refine\[0\]: got \(1, 2\); must be \(center, radius, edge\)"),
+    ):
+        with pytest.raises(hg.InputError, match='body "crate": ' + says):
+            hg.Body(shape, name="crate", density=1.0, **given)
+    pieces = [shape, (shape, (0, 0, 0.1)), (shape, (0, 0, 0.1), (0, 0, 1))]
+    assert hg.Body(shape, density=1.0, collision=pieces, refine=((np.zeros(3), 0.1, 0.01),)).name == ""
+
+
+def test_a_failing_step_keeps_what_ran():
+    """Two balls that fall through one another, dry of contact: overlap ends the run."""
+    scene = hg.Scene(gravity=(0.0, 0.0, -9.81))
+    scene.add(hg.Body(hg.sphere(0.05, faces=80), joint=hg.fixed(), density=1000.0))
+    scene.add(hg.Body(hg.sphere(0.05, faces=80), density=8000.0, position=(0.0, 0.0, 0.15)))
+    sim = hg.Simulator(scene, 0.01, fidelity="reduced")
+    with pytest.raises(hg.Error) as caught:
+        sim.rollout(steps=100)
+    partial = caught.value.rollout
+    assert 0 < partial.steps == caught.value.step < 100 and caught.value.time == pytest.approx(0.01 * partial.steps)
+    assert np.array_equal(partial.q, sim.rollout(steps=partial.steps).q)
+
+
+def test_a_cost_without_terms(sim):
+    with pytest.raises(hg.InputError, match="problem: cost: got no terms"):
+        hg.optimize.ilqr(sim, [], knots=2)
 
 
 def test_more_steps_than_there_can_be():

@@ -1,7 +1,7 @@
 //! Numbers that methods and fidelities work with, and what is chosen for each body.
 
 use super::exchange::Exchange;
-use crate::boundary;
+use crate::boundary::{self, Depth};
 use crate::coupling::full::SolveSettings;
 use crate::coupling::reduced::{Cutoff, compress};
 use serde::{Deserialize, Serialize};
@@ -34,6 +34,17 @@ impl Default for Numerics {
             films: true,
             exchange: Exchange::default(),
         }
+    }
+}
+
+impl Numerics {
+    /// The same of a body whose lengths are in units of `size` (m).
+    pub(super) fn in_units_of(&self, size: f64) -> Self {
+        let mut out = *self;
+        if let Depth::Fixed(depth) = &mut out.mfs.depth {
+            *depth /= size;
+        }
+        out
     }
 }
 

@@ -4,7 +4,7 @@
 use crate::support::forward::{self, check_forward};
 use crate::support::{INTEGRATORS, example};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, BodyId, Fluid, Joint, Plane, Scene, Shape};
+use hydrograd::scene::{Body, BodyId, Fluid, Joint, Passive, Plane, Scene, Shape};
 use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator, objective};
@@ -181,6 +181,52 @@ fn a_pair_that_comes_and_goes() {
     check(&scene, Fidelity::Auto, Integrator::Rk2, steps, 320);
     for integrator in INTEGRATORS {
         check(&scene, Fidelity::Auto, integrator, 80, 320);
+    }
+}
+
+/// Springs that turn by more than a radian in a step: where the midpoint gets there its reverse sweep does.
+#[test]
+fn stiff_springs_have_gradients_by_the_midpoint() {
+    let axis = [1.0, 0.0, 0.0];
+    for turns in [&[1.3][..], &[1.5], &[1.6], &[0.2, 1.2, 1.5]] {
+        let mut scene = Scene::new(Fluid::none());
+        scene.time_step = 0.01;
+        for (k, turn) in turns.iter().enumerate() {
+            let body = Body::dry().named(format!("mass {k}")).mass(1.0);
+            let mut body = body.inertia([0.1; 3]).joint(Joint::Prismatic { axis });
+            let stiffness = (turn / scene.time_step).powi(2);
+            body.passive = Some(Passive::default().stiffness(stiffness));
+            scene.add(body);
+            scene.initial.q.push(0.1);
+        }
+        let settings = Settings::default().integrator(Integrator::Midpoint);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let controls = Controls::zeros(&simulator, 40);
+        let rollout = simulator.rollout(&controls).unwrap();
+        let mut seed = rollout.zero_cotangents();
+        seed.q.column_mut(40).fill(1.0);
+        let found = rollout.vjp(&seed).unwrap().initial;
+        // A step turns q and v/ω by 2 atan(½ωΔt).
+        let (last, whole) = (&rollout.samples()[40].q, rollout.summary().cut_steps == 0);
+        for (k, turn) in turns.iter().enumerate() {
+            // Linear in where they start.
+            assert!(
+                (found.q[k] - last[k] / 0.1).abs() < 1e-9,
+                "{turns:?}: {found:?}"
+            );
+            if !whole {
+                continue;
+            }
+            let angle = 40.0 * 2.0 * (0.5 * turn).atan();
+            let omega = turn / scene.time_step;
+            let [by_q, by_v] = [angle.cos(), angle.sin() / omega];
+            assert!((found.q[k] - by_q).abs() < 1e-9, "{turns:?}: {found:?}");
+            assert!(
+                (found.v[k] - by_v).abs() * omega < 1e-9,
+                "{turns:?}: {found:?}"
+            );
+        }
+        check_forward("stiff springs", &simulator, 5, forward::LIMIT);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::check_gradient;
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Scene, Shape};
+use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Scene, Shape};
 use hydrograd::simulate::gradcheck::{GradcheckSettings, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
@@ -141,6 +141,30 @@ fn deep_water_has_no_surface_and_air_no_water() {
     let air = e.bias_force(&v, &DVector::zeros(0)).unwrap();
     let weight = sim.parameters().mass(0) * GRAVITY;
     assert!((air[2] / weight - 1.0).abs() < 1e-12);
+}
+
+/// A box whose top is level stays where it is put under water: by rounding its top is no waterplane.
+#[test]
+fn a_level_top_under_water_has_no_stiffness() {
+    for k in 0..8 {
+        let mut scene = floating(Shape::cuboid([1.0, 0.6, 0.4]).faces(48));
+        let body = &mut scene.bodies[0];
+        let turn = 0.1 + 0.2 * f64::from(k);
+        body.shape_at.rotation = [-turn, 0.0, 0.0];
+        body.placement.rotation = [turn, 0.0, 0.0];
+        body.placement.position[2] -= 5.0;
+        body.density = Some(DENSITY);
+        body.joint = Joint::Prismatic {
+            axis: [0.0, 0.0, 1.0],
+        };
+        let sim = simulator(&scene, Fidelity::Isolated, Integrator::VelocityEuler);
+        let rollout = sim.rollout(&Controls::zeros(&sim, 20)).unwrap();
+        let mut seed = rollout.zero_cotangents();
+        seed.v[(0, 20)] = 1.0;
+        let found = rollout.vjp(&seed).unwrap().initial;
+        let off = found.q[0].abs().max((found.v[0] - 1.0).abs());
+        assert!(off < 1e-9, "turned by {turn}: {found:?}");
+    }
 }
 
 /// Over 1000 steps without controls, of the largest kinetic energy.

@@ -4,7 +4,7 @@ use crate::support::mesh;
 use crate::support::reference::{TwoSpheres, equal_spheres};
 use crate::support::says;
 use hydrograd::adjoint::lie::{Mat3, Pose, Vec3};
-use hydrograd::boundary::{ExactBoundary, PanelBoundary};
+use hydrograd::boundary::{Depth, ExactBoundary, PanelBoundary};
 use hydrograd::coupling::reduced::{Reduced, ReducedBody, cache, compress};
 use hydrograd::coupling::{Coupling, Direction, Exclusions, Linearise};
 use hydrograd::scene::{Body, Fluid, Scene, Shape, Wall, WallSurface};
@@ -423,4 +423,30 @@ fn directions_outside_the_basis_agree_with_those_on_it() {
     }
     let value = pair.evaluate(&poses, &basis).unwrap();
     assert_eq!(value.momenta(), record.momenta());
+}
+
+/// A depth of sources is in metres, whatever a fidelity measures a body in: small spheres, a third of a radius deep, coupled by all points and by compressed ones.
+#[test]
+fn depths_are_in_metres() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    for x in [0.0, 0.06] {
+        let ball = Body::new(Shape::sphere(0.02)).density(1.0);
+        scene.add(ball.at([x, 0.0, 0.0]));
+    }
+    let of = |fidelity: Fidelity, depth: Depth| {
+        let settings = Settings::default().fidelity(fidelity).depth(depth);
+        let settings = settings.method(Method::MfsVertex).faces(320);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        simulator.added_mass().unwrap().matrix
+    };
+    let depth = Depth::Fixed(0.0066);
+    let [full, reduced] = [Fidelity::Full, Fidelity::Reduced].map(|f| of(f, depth));
+    let automatic = of(Fidelity::Reduced, Depth::Auto);
+    let off = |m: &DMatrix<f64>| (m - &full).view((0, 0), (3, 3)).amax() / full[(0, 0)];
+    println!(
+        "reduced off by {:.1e}, with an automatic depth {:.1e}",
+        off(&reduced),
+        off(&automatic)
+    );
+    assert!(off(&reduced) < 1e-3);
 }

@@ -57,7 +57,7 @@ fn a_refined_corner_changes_little_of_the_added_mass() {
 fn closed_forms_do_not_see_the_mesh() {
     let ball = |refine: bool| {
         let mut scene = Scene::new(Fluid::fresh_water());
-        let body = Body::new(Shape::ellipsoid([0.2, 0.1, 0.1])).density(998.0);
+        let body = Body::new(Shape::ellipsoid([0.2, 0.1, 0.1]).faces(320)).density(998.0);
         scene.add(if refine {
             body.refine([0.2, 0.0, 0.0], 0.05, 0.01)
         } else {

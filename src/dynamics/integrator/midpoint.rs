@@ -4,7 +4,7 @@
 //! p̂⁺ = p̂ + Δt f. In a current ½Δt f − ¼Δt² D f stands for ½Δt f: momenta in the middle are taken about a point that
 //! has drifted by then ([`crate::dynamics::Drift`]). The velocity is found by [`quasi::descend`] in v and q_m(v) at once, one evaluation a step; where that doesn't get there, by Newton at
 //! fixed q_m (cheap) inside a fixed point in
-//! q_m (one evaluation each); the adjoint iterates the transpose of that splitting, the tangent solves for all
+//! q_m (one evaluation each); the adjoint solves with the transpose of that splitting by GMRES, which gets there wherever the step does, the tangent for all
 //! directions at once.
 //!
 //! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
@@ -18,8 +18,7 @@ use super::euler::{Equation, noise, solve_stage};
 use super::plan::Halt;
 use super::quasi;
 use super::rule::Rule;
-use super::split::share;
-use super::stage_adjoint::{AdjointStage, solve_columns};
+use super::stage_adjoint::{AdjointStage, krylov, solve_columns};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
@@ -32,6 +31,9 @@ use nalgebra::{DMatrix, DVector};
 /// Relative change of the velocity at which the fixed point in q_m ends.
 const TOLERANCE: f64 = 1e-14;
 const ITERATIONS: usize = 60;
+/// What is left of the adjoint's equation, of what it sums; and the coarsest that a part of the sum is solved to.
+const ADJOINT: f64 = 1e-13;
+const ENOUGH: f64 = 1e-6;
 
 /// Half the force, at a configuration that is the stage's own.
 fn rule(s: &Stepper) -> Rule {
@@ -183,44 +185,90 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
 
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, split, m) = (start.stepper, start.split, &self.middle);
-        let before = &self.contact.velocities.before;
-        let h = 0.5 * s.dt;
         let mut bar = StepBar::zeros(start.e);
         let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, None, &mut bar)?;
         let v_bar_force = s.dt * self.stage.rates_vjp(m, &z)?;
         let fixed = v_bar_next + v_bar_force;
-        // v̄ = fixed + (∂q_m/∂v)ᵀ q̄_m(w), w = J⁻ᵀ v̄.
-        let mut v_bar = fixed.clone();
-        let mut previous = f64::INFINITY;
-        for _ in 0..ITERATIONS {
-            let w = self.stage.solve(m, split, &v_bar)?;
-            let z_total = s.dt * &z + rule(s).impulse_back(m, &m.frame_velocity(&w));
-            // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
-            let mut inner = StepBar::zeros(m);
-            let control = &start.input.control;
-            inner.add(1.0, &m.force_vjp(before, control, &z_total)?);
-            inner.add(-1.0, &m.momentum_vjp(before, &w)?);
-            inner.state.q += m.frame_velocity_vjp(&w, &self.reached);
-            split.forget_moved(&mut inner.state.q);
-            let (q_start, xi) = s.system.tree.integrate_vjp(&(h * before), &inner.state.q);
-            let next = &fixed + h * xi;
-            let moved = share((&next - &v_bar).norm(), next.norm());
-            if moved <= 1e-13 || (moved <= 10.0 * noise(m) && moved > 0.5 * previous) {
-                bar.state.q += q_start;
-                bar.control += inner.control;
-                bar.parameters.add(&inner.parameters);
-                let p_bar = &z + m.frame_velocity(&w);
-                start.momentum_vjp(&p_bar, &mut bar)?;
-                return Ok(bar);
-            }
-            previous = moved;
-            v_bar = next;
+        // Jᵀ w = fixed + (∂q_m/∂v)ᵀ q̄_m(w, z), of free velocities; q̄_m is linear in w and z.
+        let mut w = self.stage.solve(m, split, &fixed)?;
+        let mut back = self.through_middle(start, &w, &z)?;
+        let missing = split.take(&back.v);
+        let size = (split.take(&fixed) + &missing).norm();
+        // NaN goes on to the error.
+        let done = missing.norm() <= ADJOINT * size;
+        if !done {
+            w += self.fed_back(start, &missing, size)?;
+            back = self.through_middle(start, &w, &z)?;
+        }
+        bar.state.q += back.q;
+        bar.control += back.inner.control;
+        bar.parameters.add(&back.inner.parameters);
+        start.momentum_vjp(&(&z + m.frame_velocity(&w)), &mut bar)?;
+        Ok(bar)
+    }
+}
+
+/// What comes back through the middle of a step.
+struct Through {
+    /// Cotangents of the middle and of what acts there.
+    inner: StepBar,
+    /// Those of the middle, carried on to q and to v.
+    q: DVector<f64>,
+    v: DVector<f64>,
+}
+
+impl<'a> Adjoint<'_, 'a> {
+    /// The cotangents that come back through q_m from `w` of the stage's equation and `z` of the momenta after the step.
+    fn through_middle(
+        &self,
+        start: &Start<'_, 'a>,
+        w: &DVector<f64>,
+        z: &DVector<f64>,
+    ) -> Result<Through> {
+        let (s, split, m) = (start.stepper, start.split, &self.middle);
+        let (before, control) = (&self.contact.velocities.before, &start.input.control);
+        let h = 0.5 * s.dt;
+        let z_total = s.dt * z + rule(s).impulse_back(m, &m.frame_velocity(w));
+        // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
+        let mut inner = StepBar::zeros(m);
+        inner.add(1.0, &m.force_vjp(before, control, &z_total)?);
+        inner.add(-1.0, &m.momentum_vjp(before, w)?);
+        inner.state.q += m.frame_velocity_vjp(w, &self.reached);
+        split.forget_moved(&mut inner.state.q);
+        let (q, xi) = (s.system.tree).integrate_vjp(&(h * before), &inner.state.q);
+        let v = h * xi;
+        Ok(Through { inner, q, v })
+    }
+
+    /// w, zero on driven entries, with Jᵀ w − (∂q_m/∂v)ᵀ q̄_m(w) = `missing` of free velocities, which is a part of a sum of norm `size`.
+    fn fed_back(
+        &self,
+        start: &Start<'_, 'a>,
+        missing: &DVector<f64>,
+        size: f64,
+    ) -> Result<DVector<f64>> {
+        let (split, m) = (start.split, &self.middle);
+        let none = DVector::zeros(start.v.len());
+        // Cotangents in units of about the root of their inertia.
+        let scale = split.scale(&m.mass_blocks().diagonal());
+        let apply = |x: &DVector<f64>| {
+            let x = split.put(&x.component_div(&scale));
+            let w = self.stage.solve(m, split, &x)?;
+            let left = x - self.through_middle(start, &w, &none)?.v;
+            Ok([split.take(&w), split.take(&left).component_mul(&scale)])
+        };
+        // The stage's own solves tell no more where they are products.
+        let least = m.scattered().map_or(ADJOINT, |_| noise(m));
+        let tolerance = least.max(ADJOINT * size / missing.norm()).min(ENOUGH);
+        let found = krylov(apply, &missing.component_mul(&scale), tolerance)?;
+        if found.residual <= tolerance.max(10.0 * noise(m)) {
+            return Ok(split.put(&DVector::from_vec(found.x.data)));
         }
         Err(Error::Solver {
             what: format!("adjoint of the {}", start.stage_name()),
-            iterations: ITERATIONS,
-            residual: previous,
-            tolerance: 1e-13,
+            iterations: found.iterations,
+            residual: found.residual,
+            tolerance,
             remedy: "take a smaller time step".into(),
         })
     }

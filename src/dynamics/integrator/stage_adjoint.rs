@@ -6,7 +6,7 @@ use super::stage_factor::{StageFactor, StageMatrix};
 use super::stage_matrix::stage_matrix;
 use crate::dynamics::Linearisation;
 use crate::dynamics::island_matrix::IslandMatrix;
-use crate::solver::{Columns, gmres};
+use crate::solver::{Columns, Outcome, gmres};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
@@ -142,34 +142,16 @@ impl<'a> AdjointStage<'a> {
         factor: &StageFactor,
         right: &DVector<f64>,
     ) -> Result<DVector<f64>> {
-        let failed = RefCell::new(None);
-        let column = |x: &DVector<f64>| Columns {
-            rows: x.len(),
-            columns: 1,
-            data: x.as_slice().to_vec(),
-        };
         // Rows in units of about the root of their inertia.
         let scale = split.scale(&e.mass_blocks().diagonal());
-        let apply = |v: &Columns, _: &[usize]| {
-            let v = DVector::from_column_slice(&v.data).component_div(&scale);
-            let tried = factor.solve(&v, None).ok_or_else(|| singular("adjoint"));
-            let tried = tried.and_then(|w| {
-                let moved = self.transposed(e, &split.put(&w))?;
-                Ok([w, split.take(&moved).component_mul(&scale)])
-            });
-            match tried {
-                Ok(both) => both.map(|x| column(&x)),
-                Err(error) => {
-                    failed.borrow_mut().get_or_insert(error);
-                    [column(&v), column(&(f64::NAN * &v))]
-                }
-            }
+        let apply = |v: &DVector<f64>| {
+            let v = v.component_div(&scale);
+            let w = factor.solve(&v, None);
+            let w = w.ok_or_else(|| singular("adjoint"))?;
+            let moved = self.transposed(e, &split.put(&w))?;
+            Ok([w, split.take(&moved).component_mul(&scale)])
         };
-        let right = column(&right.component_mul(&scale));
-        let found = gmres(apply, &right, TOLERANCE, ITERATIONS, ITERATIONS);
-        if let Some(error) = failed.into_inner() {
-            return Err(error);
-        }
+        let found = krylov(apply, &right.component_mul(&scale), TOLERANCE)?;
         e.check()?;
         if found.residual.is_nan() || found.residual > ENOUGH {
             return Err(Error::Solver {
@@ -182,6 +164,35 @@ impl<'a> AdjointStage<'a> {
         }
         Ok(DVector::from_vec(found.x.data))
     }
+}
+
+/// [`gmres`] of one column, `apply` taking v to `[M⁻¹ v, A M⁻¹ v]`.
+///
+/// # Errors
+/// What `apply` fails with first.
+pub(super) fn krylov(
+    apply: impl Fn(&DVector<f64>) -> Result<[DVector<f64>; 2]>,
+    right: &DVector<f64>,
+    tolerance: f64,
+) -> Result<Outcome> {
+    let failed = RefCell::new(None);
+    let column = |x: &DVector<f64>| Columns {
+        rows: x.len(),
+        columns: 1,
+        data: x.as_slice().to_vec(),
+    };
+    let tried = |v: &Columns, _: &[usize]| {
+        let v = DVector::from_column_slice(&v.data);
+        match apply(&v) {
+            Ok(both) => both.map(|x| column(&x)),
+            Err(error) => {
+                failed.borrow_mut().get_or_insert(error);
+                [column(&v), column(&(f64::NAN * &v))]
+            }
+        }
+    };
+    let found = gmres(tried, &column(right), tolerance, ITERATIONS, ITERATIONS);
+    failed.into_inner().map_or(Ok(found), Err)
 }
 
 /// Columns dv, zero on driven rows, with `matrix` · dv_f = right_f.

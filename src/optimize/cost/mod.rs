@@ -44,6 +44,11 @@ impl Cost {
         self
     }
 
+    /// Whether it has no terms.
+    pub fn is_empty(&self) -> bool {
+        self.running.is_empty() && self.last.is_empty()
+    }
+
     /// With another term at the end.
     pub fn last(mut self, term: Term) -> Self {
         self.last.push(term);

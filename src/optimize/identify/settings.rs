@@ -52,7 +52,7 @@ impl Default for IdentifySettings {
         Self {
             iterations: 50,
             loss: Loss::Squared,
-            damping: 1e-3,
+            damping: 1e-6,
             cost_tolerance: 1e-8,
             step_tolerance: 1e-3,
             profiles: 1,

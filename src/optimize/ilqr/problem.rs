@@ -112,6 +112,13 @@ impl Ready {
                 ));
             }
         }
+        if problem.cost.is_empty() {
+            return Err(Error::input(
+                "problem: cost",
+                "no terms",
+                "give at least one: without, every trajectory is as good",
+            ));
+        }
         // Before anything is made for each of them.
         let steps = problem.knots.saturating_mul(problem.hold);
         (simulator.check_steps(steps)).map_err(|e| e.within("problem: knots · hold"))?;

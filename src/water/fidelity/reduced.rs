@@ -325,6 +325,7 @@ struct InUnits<'a> {
     ellipsoid: Option<([f64; 3], Pose)>,
     regions: Vec<Region>,
     settings: compress::CompressSettings,
+    numerics: Numerics,
     /// The smallest gap that it resolves anywhere.
     finest: f64,
 }
@@ -334,6 +335,7 @@ impl<'a> InUnits<'a> {
         body: &SubmergedBody<'a>,
         method: &'static dyn BodyMethod,
         chosen: &compress::CompressSettings,
+        numerics: &Numerics,
     ) -> Result<Self> {
         chosen.validate()?;
         let mesh = method.layout(body)?;
@@ -378,6 +380,7 @@ impl<'a> InUnits<'a> {
                 resolved_gap: Some(gap),
                 ..*chosen
             },
+            numerics: numerics.in_units_of(size),
         })
     }
 
@@ -428,11 +431,11 @@ fn compressed_body(
     method: &'static dyn BodyMethod,
     chosen: &compress::CompressSettings,
 ) -> Result<cache::Fetched> {
-    let own = InUnits::new(body, method, chosen)?;
-    let made_from = method.made_from(&own.body(), problem.numerics);
+    let own = InUnits::new(body, method, chosen, problem.numerics)?;
+    let made_from = method.made_from(&own.body(), &own.numerics);
     let key = cache::Key::new(&own.mesh, &made_from, &own.settings, &own.regions);
     let found = cache::fetch(key, problem.folder, || {
-        let response = method.response(&own.body(), problem.numerics, own.finest)?;
+        let response = method.response(&own.body(), &own.numerics, own.finest)?;
         let (settings, regions) = (&own.settings, &own.regions);
         compress::compress(body.name, &own.mesh, response.as_ref(), settings, regions)
     });
@@ -470,7 +473,7 @@ fn shape_slopes(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<(usi
             continue;
         }
         let method = problem.method_for(body)?;
-        let units = InUnits::new(body, method, problem.chosen(b))?;
+        let units = InUnits::new(body, method, problem.chosen(b), problem.numerics)?;
         let (size, own) = (units.size, alone_slopes(problem, body, group)?);
         let moving: Vec<_> = group
             .iter()
@@ -492,7 +495,7 @@ fn shape_slopes(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<(usi
                 let units = &units;
                 move |t: f64| {
                     let changed = units.changed(change, t);
-                    method.response(&changed.body(), problem.numerics, units.finest)
+                    method.response(&changed.body(), &units.numerics, units.finest)
                 }
             })
             .collect();
@@ -507,7 +510,7 @@ fn shape_slopes(problem: &Problem, made: &[Arc<ReducedBody>]) -> Result<Vec<(usi
                 },
             )
             .collect();
-        let response = method.response(&units.body(), problem.numerics, units.finest)?;
+        let response = method.response(&units.body(), &units.numerics, units.finest)?;
         let (settings, regions) = (&units.settings, &units.regions);
         let points = made[b].parts().points.iter();
         let points: Vec<Vec3> = points.map(|p| p / size).collect();

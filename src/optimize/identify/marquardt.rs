@@ -8,8 +8,10 @@ use std::ops::ControlFlow;
 
 /// Part of the expected fall that a step must bring.
 const ENOUGH: f64 = 1e-4;
-/// Damping up to which a step is nearly that of Gauss and Newton.
-const LIGHT: f64 = 1.0;
+/// Damping of a step of Gauss and Newton, but for what rounding alone tells.
+const NO_DAMPING: f64 = 1e-14;
+/// Part of the fall that a step of Gauss and Newton promises from which on one counts as such.
+const LIGHT: f64 = 0.5;
 /// Damping at which no step is left.
 const MOST_DAMPING: f64 = 1e14;
 
@@ -94,14 +96,16 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             }
             iterations += 1;
             let step = self.step(&at.x, &linear, damping);
-            // Heavy damping makes any step small: that is no end.
-            let is_near = step.expected.abs() <= self.settings.cost_tolerance * at.cost;
-            if is_near && refused > 0 {
-                break IdentifyStop::Stuck;
-            }
-            if is_near && damping <= LIGHT {
+            // Damping makes any step small, where unknowns are hard to tell apart little of it: that is no end.
+            let promised = self.step(&at.x, &linear, NO_DAMPING).expected;
+            let is_near = |expected: f64| expected.abs() <= self.settings.cost_tolerance * at.cost;
+            if is_near(promised) {
                 break IdentifyStop::Cost;
             }
+            if is_near(step.expected) && refused > 0 {
+                break IdentifyStop::Stuck;
+            }
+            let is_light = step.expected >= LIGHT * promised;
             // A step that leads uphill in the model, cut by bounds, isn't tried.
             let trial = match step.expected > 0.0 {
                 true => self.try_out(&step.to)?,
@@ -134,10 +138,10 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             if progress(&told).is_break() {
                 break IdentifyStop::Asked;
             }
-            if is_taken && damping <= LIGHT && fell <= self.settings.cost_tolerance * at.cost {
+            if is_taken && is_light && fell <= self.settings.cost_tolerance * at.cost {
                 break IdentifyStop::Cost;
             }
-            if is_taken && damping <= LIGHT && step.size <= self.settings.step_tolerance {
+            if is_taken && is_light && step.size <= self.settings.step_tolerance {
                 break IdentifyStop::Step;
             }
         };

@@ -145,7 +145,7 @@ impl CostTerm {
     #[pyo3(signature = (name, entries, target, weights, *, times=None, last=false))]
     fn observable(
         name: String,
-        #[pyo3(from_py_with = counts::lists::entries)] entries: Vec<usize>,
+        #[pyo3(from_py_with = counts::entries)] entries: Vec<usize>,
         target: &Bound<'_, PyAny>,
         weights: &Bound<'_, PyAny>,
         times: Option<&Bound<'_, PyAny>>,

@@ -217,24 +217,31 @@ pub mod counts {
         );
     }
 
-    /// Lists of them; None is an empty one.
+    /// A list of them.
+    fn list(keyword: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+        let each = |(k, one): (usize, PyResult<Bound<'_, PyAny>>)| {
+            count(&format!("{keyword}[{k}]"), &one?)
+        };
+        given.try_iter()?.enumerate().map(each).collect()
+    }
+
+    pub fn entries(given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+        list("entries", given)
+    }
+
+    /// Lists that may be left out.
     pub mod lists {
         use super::*;
 
         macro_rules! keywords {
             ($($keyword:ident),*) => {
-                $(pub fn $keyword(given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
-                    let each = |(k, one): (usize, PyResult<Bound<'_, PyAny>>)| {
-                        count(&format!("{}[{k}]", stringify!($keyword)), &one?)
-                    };
-                    if given.is_none() {
-                        return Ok(Vec::new());
-                    }
-                    given.try_iter()?.enumerate().map(each).collect()
+                $(pub fn $keyword(given: &Bound<'_, PyAny>) -> PyResult<Option<Vec<usize>>> {
+                    let some = (!given.is_none()).then(|| list(stringify!($keyword), given));
+                    some.transpose()
                 })*
             };
         }
-        keywords!(entries, faces, ranks);
+        keywords!(faces, ranks);
     }
 }
 

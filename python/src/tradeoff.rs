@@ -30,7 +30,7 @@ fn all<T: VariantArray + FromStr + Into<&'static str> + Copy>(
 /// takes the time it needs. Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
-    scene, *, fidelities=None, methods=None, faces=Vec::new(), ranks=Vec::new(), accuracies=None, tolerances=None, integrators=None,
+    scene, *, fidelities=None, methods=None, faces=None, ranks=None, accuracies=None, tolerances=None, integrators=None,
     time_steps=None, full_product=false, steps=None, reference_faces=None, budget=120.0
 ))]
 #[expect(clippy::too_many_arguments, reason = "one per keyword")]
@@ -39,8 +39,8 @@ pub fn tradeoff<'py>(
     scene: &Bound<'py, Scene>,
     fidelities: Option<Vec<String>>,
     methods: Option<Vec<String>>,
-    #[pyo3(from_py_with = counts::lists::faces)] faces: Vec<usize>,
-    #[pyo3(from_py_with = counts::lists::ranks)] ranks: Vec<usize>,
+    #[pyo3(from_py_with = counts::lists::faces)] faces: Option<Vec<usize>>,
+    #[pyo3(from_py_with = counts::lists::ranks)] ranks: Option<Vec<usize>>,
     accuracies: Option<Vec<f64>>,
     tolerances: Option<Vec<f64>>,
     integrators: Option<Vec<String>>,
@@ -53,8 +53,8 @@ pub fn tradeoff<'py>(
     let settings = TradeoffSettings {
         fidelities: all("fidelities", fidelities)?,
         methods: all("methods", methods)?,
-        faces,
-        ranks,
+        faces: faces.unwrap_or_default(),
+        ranks: ranks.unwrap_or_default(),
         accuracies: accuracies.unwrap_or_default(),
         tolerances: tolerances.unwrap_or_default(),
         integrators: all("integrators", integrators)?,

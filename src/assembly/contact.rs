@@ -58,15 +58,24 @@ fn solved(scene: &Scene) -> String {
 /// Why another integrator stands in for the preset's, where one does.
 pub(super) fn stand_in(scene: &Scene, choices: &Choices) -> Option<String> {
     let [used, instead] = [choices.integrator, choices.in_place_of?].map(<&str>::from);
-    if let (false, Some(body)) = (scene.has_contact(), scene.resisting()) {
-        return Some(format!(
-            "the integrator {used}, of first order, in place of {instead}: what the joint of body {:?} resists with (`passive`, `servo`) is taken at the end of a step, which is stable however stiff; midpoint takes it implicitly, too, and is of second order but for servos",
+    let why = match (scene.has_contact(), scene.resisting()) {
+        (false, Some(body)) => format!(
+            "what the joint of body {:?} resists with (`passive`, `servo`) is taken implicitly, which is stable however stiff",
             body.name
-        ));
-    }
+        ),
+        _ => format!("{} asks for one that solves contact", solved(scene)),
+    };
+    let carriers = scene.carriers();
+    let swinging = carriers.articulated().map(|b| &scene.bodies[b].name);
+    let order = match (choices.integrator, swinging) {
+        (Integrator::Midpoint, _) => "it is of second order but for servos and where something presses".into(),
+        (_, Some(name)) => format!(
+            "it is of first order, and errs by what body {name:?} and those that carry it have of speed: where they move fast and hardly touch take midpoint, which is of second order where nothing presses"
+        ),
+        (_, None) => "it is of first order; midpoint does that, too, and is of second order but for servos and where something presses".into(),
+    };
     Some(format!(
-        "the integrator {used}, of first order, in place of {instead}: {} asks for one that solves contact; midpoint does, too, and is of second order where nothing presses",
-        solved(scene)
+        "the integrator {used} in place of {instead}: {why}; {order}"
     ))
 }
 

@@ -184,7 +184,7 @@ pub(super) struct Simulation {
     /// Time step in s [default: the scene's own].
     #[arg(long, value_name = "DT", allow_negative_numbers = true)]
     time_step: Option<f64>,
-    /// How a step is taken [default: rk4; momentum-euler with contact, limits of joints, lubrication, joints that damp or rub, and servos; velocity-euler with the preset paper].
+    /// How a step is taken [default: rk4; with contact, limits of joints, lubrication, joints that damp or rub, and servos momentum-euler, or midpoint if joints hang on moving bodies and nothing touches; velocity-euler with the preset paper].
     #[arg(long, value_parser = choice::<Integrator>())]
     integrator: Option<Integrator>,
 }

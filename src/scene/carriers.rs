@@ -38,6 +38,16 @@ impl Carriers<'_> {
         })
     }
 
+    /// A body that moves against one that moves itself.
+    pub fn articulated(&self) -> Option<usize> {
+        let moves = |b: &usize| {
+            let body = &self.scene.bodies[*b];
+            body.joint.velocities() > 0 && !body.locked
+        };
+        let carrying = |b: usize| std::iter::successors(self.parents[b], |b| self.parents[*b]);
+        (0..self.parents.len()).find(|b| moves(b) && carrying(*b).any(|b| moves(&b)))
+    }
+
     /// The nearest body with a shape among those that carry body `b`: what `overlaps_parent` speaks of.
     pub fn submerged_parent(&self, b: usize) -> Option<usize> {
         let mut carrying = std::iter::successors(self.parents[b], |b| self.parents[*b]);

@@ -112,16 +112,21 @@ impl Settings {
 
     /// What these settings and a scene decide together.
     ///
-    /// Contact is solved in the velocity that a step moves by, and what joints resist with may be far too stiff for a velocity from before: a scene with either gets
-    /// [`Integrator::MomentumEuler`] where nobody chose an integrator and the preset's can't do that, which
-    /// [`Simulator::reasons`](super::Simulator::reasons) says.
+    /// Contact is solved in the velocity that a step moves by, and what joints resist with may be far too stiff for a velocity from before: where nobody chose an integrator and the
+    /// preset's can't do that, a scene with either gets [`Integrator::Midpoint`] if it has a body that moves against one that moves itself, whose swing a step of first order
+    /// misses by what both have of speed, and no bodies that touch; otherwise [`Integrator::MomentumEuler`], which shows what rests on something at rest. [`Simulator::reasons`](super::Simulator::reasons)
+    /// says which.
     pub fn resolve(&self, scene: &Scene) -> Choices {
         let preset = self.preset.unwrap_or(scene.preset);
         let mut base = Choices::preset(preset, scene.time_step);
         let asked = scene.has_contact() || scene.resisting().is_some();
         if asked && !base.integrator.solves_contact() && self.integrator.is_none() {
             base.in_place_of = Some(base.integrator);
-            base.integrator = Integrator::MomentumEuler;
+            let swings = scene.contact.is_none() && scene.carriers().articulated().is_some();
+            base.integrator = match swings {
+                true => Integrator::Midpoint,
+                false => Integrator::MomentumEuler,
+            };
         }
         self.over(base)
     }

@@ -32,6 +32,8 @@ use nalgebra::{DMatrix, DVector};
 const ITERATIONS: usize = 40;
 /// Residual that is accepted at the last iteration, and below which none is asked to fall.
 const ENOUGH: f64 = 1e-11;
+/// Distance from the world's origin, m, from which on its moments hide those of bodies of a metre or less: their part of them falls with its square.
+const FAR: f64 = 1e3;
 /// Shortest part of Newton's step.
 const SHORTEST: f64 = 1.0 / 4096.0;
 
@@ -211,16 +213,23 @@ pub(super) fn solve_stage<'a>(
     let turning = (twists.iter())
         .map(|t| angular(t).norm())
         .fold(0.0, f64::max);
+    let poses = e.kinematics.poses.iter();
+    let farthest = poses.map(|p| p.translation.norm()).fold(0.0, f64::max);
+    let remedy = match farthest > FAR {
+        true => format!(
+            "bodies are up to {farthest:.1e} m from the world's origin, and momenta about it lose their digits: put the origin near the bodies, or take an explicit integrator"
+        ),
+        false => format!(
+            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad in it)",
+            turning * rule.reach.max(2.0 * (rule.h - rule.reach))
+        ),
+    };
     Err(Error::Solver {
         what: start.stage_name(),
         iterations: ITERATIONS,
         residual,
         tolerance: 1e-13,
-        remedy: format!(
-            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad \
-             in it)",
-            turning * rule.reach.max(2.0 * (rule.h - rule.reach))
-        ),
+        remedy,
     }
     .into())
 }

@@ -10,7 +10,7 @@ use hydrograd::simulate::Sample;
 use hydrograd::{Controls, Fidelity, Rollout, Settings, Simulator, objective};
 
 const STEPS: usize = 40;
-const COUNT: usize = 240;
+const COUNT: usize = 120;
 
 /// Numbers of one scene, used one after the other.
 struct Dice(std::vec::IntoIter<f64>);

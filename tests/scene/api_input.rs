@@ -2,10 +2,11 @@
 
 use crate::support::{example, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Preset, Scene};
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Passive, Preset, Scene};
 use hydrograd::simulate::{Action, ActionBar, Method, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
+use std::f64::consts::FRAC_PI_2;
 
 fn simulator(name: &str) -> Simulator {
     let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
@@ -271,6 +272,40 @@ fn energy_from_nowhere_is_told() {
     assert!(told[0] > 0 && told[1] > 0, "{told:?}");
     let implicit = Simulator::new(&stiff, settings.integrator(Integrator::MomentumEuler)).unwrap();
     assert!(implicit.rollout(&controls).unwrap().warnings().is_empty());
+}
+
+/// What a motion gives is no energy from nowhere, of a dry body far off its axis and of its drive as well.
+#[test]
+fn energy_of_a_given_motion_is_told_of_nobody() {
+    let dry = |center: [f64; 3], inertia: [f64; 3], armature: f64| {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        let axis = [1.0, 0.0, 0.0];
+        let crank = Body::dry().named("crank").mass(1.0).inertia(inertia);
+        let crank = crank.joint(Joint::Revolute { axis }).center_of_mass(center);
+        let from_rest = Motion::Sine {
+            offset: 0.0,
+            amplitude: 0.5,
+            frequency: 6.0,
+            phase: FRAC_PI_2,
+        };
+        let mut crank = crank.driven([from_rest]);
+        crank.passive = Some(Passive {
+            armature,
+            ..Default::default()
+        });
+        scene.add(crank);
+        scene
+    };
+    for scene in [
+        dry([0.0, 0.3, 0.0], [0.03, 0.001, 0.03], 0.0),
+        dry([0.0; 3], [0.03, 0.001, 0.03], 0.0),
+        dry([0.0; 3], [1e-9; 3], 0.1),
+    ] {
+        let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 50)).unwrap();
+        assert!(rollout.samples()[50].kinetic_energy > 0.0);
+        assert_eq!(rollout.warnings(), Vec::<String>::new());
+    }
 }
 
 #[test]

@@ -273,6 +273,7 @@ fn feedback_of_other_sizes() {
     let seen = Observation {
         step: 0,
         time: 0.0,
+        time_step: 0.01,
         q,
         v,
         mode: 0,

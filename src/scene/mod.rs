@@ -32,7 +32,7 @@ pub use crate::shape::Shape;
 pub use build::BodyId;
 pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
-pub(crate) use force::{AXES, least_damping};
+pub(crate) use force::{AXES, BUOYANT_ANYWHERE, least_damping};
 pub use force::{
     Coefficients, Current, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Tendon, Thruster,
     WATER_VISCOSITY,

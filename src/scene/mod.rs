@@ -331,7 +331,7 @@ pub enum Controller {
         /// negative, from below otherwise.
         stop_at: f64,
     },
-    /// Given controls, each for as long as a step of the scene, and nothing after the last: an optimised trajectory to be run again, with steps of another length as well.
+    /// Given controls, each for as long as a step of the scene, and nothing after the last: an optimised trajectory to be run again, with steps of another length as well: one that goes over several has their mean.
     Playback {
         /// One row per step, in it one per control, N or N m.
         control: Vec<Vec<f64>>,

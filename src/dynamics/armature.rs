@@ -28,7 +28,7 @@ impl Armature {
     }
 
     /// Each velocity that has it, with the inertia.
-    pub(crate) fn entries<'a>(
+    pub(super) fn entries<'a>(
         &'a self,
         parameters: &'a Parameters,
     ) -> impl Iterator<Item = (usize, f64)> + 'a {

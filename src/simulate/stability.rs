@@ -164,7 +164,7 @@ impl Rollout {
         ))
     }
 
-    /// Kinetic energy of all bodies, what drives add to their inertia, and as much water as they displace, at the speeds that motions and the current give them, J.
+    /// Kinetic energy of all bodies, and as much water as they displace, at the speeds that motions and the current give them, J.
     fn given(&self, s: &Sample) -> f64 {
         let (system, parameters) = (self.simulator.system(), self.simulator.parameters());
         let tree = &system.tree;
@@ -190,9 +190,7 @@ impl Rollout {
             let water = system.water_velocity(&pose.translation, s.time, parameters);
             0.5 * (own + moved + (mass + displaced) * water.norm_squared())
         };
-        let drives = system.armature.entries(parameters);
-        let drives = drives.map(|(i, own)| 0.5 * own * driven[i] * driven[i]);
-        twists.iter().enumerate().map(of).sum::<f64>() + drives.sum::<f64>()
+        twists.iter().enumerate().map(of).sum()
     }
 }
 

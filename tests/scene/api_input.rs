@@ -2,7 +2,7 @@
 
 use crate::support::{example, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Motion, Passive, Preset, Scene};
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Preset, Scene};
 use hydrograd::simulate::{Action, ActionBar, Method, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
@@ -274,33 +274,21 @@ fn energy_from_nowhere_is_told() {
     assert!(implicit.rollout(&controls).unwrap().warnings().is_empty());
 }
 
-/// What a motion gives is no energy from nowhere, of a dry body far off its axis and of its drive as well.
+/// What a motion gives is no energy from nowhere, of a dry body in or far off its axis as well.
 #[test]
 fn energy_of_a_given_motion_is_told_of_nobody() {
-    let dry = |center: [f64; 3], inertia: [f64; 3], armature: f64| {
+    for center in [0.0, 0.3] {
         let mut scene = Scene::new(Fluid::fresh_water());
         let axis = [1.0, 0.0, 0.0];
-        let crank = Body::dry().named("crank").mass(1.0).inertia(inertia);
-        let crank = crank.joint(Joint::Revolute { axis }).center_of_mass(center);
+        let crank = Body::dry().mass(1.0).inertia([0.03, 0.001, 0.03]);
+        let crank = crank.center_of_mass([0.0, center, 0.0]);
         let from_rest = Motion::Sine {
             offset: 0.0,
             amplitude: 0.5,
             frequency: 6.0,
             phase: FRAC_PI_2,
         };
-        let mut crank = crank.driven([from_rest]);
-        crank.passive = Some(Passive {
-            armature,
-            ..Default::default()
-        });
-        scene.add(crank);
-        scene
-    };
-    for scene in [
-        dry([0.0, 0.3, 0.0], [0.03, 0.001, 0.03], 0.0),
-        dry([0.0; 3], [0.03, 0.001, 0.03], 0.0),
-        dry([0.0; 3], [1e-9; 3], 0.1),
-    ] {
+        scene.add(crank.joint(Joint::Revolute { axis }).driven([from_rest]));
         let simulator = Simulator::new(&scene, Settings::default()).unwrap();
         let rollout = simulator.rollout(&Controls::zeros(&simulator, 50)).unwrap();
         assert!(rollout.samples()[50].kinetic_energy > 0.0);

@@ -104,7 +104,7 @@ fn cost(rollout: &Rollout, along: f64) -> hydrograd::Result<(f64, Cotangents, Ve
     let weight = FORCE.powi(-2) / rollout.controls().len() as f64;
     for (n, s) in samples[..end].iter().enumerate() {
         sum += weight * s.control.norm_squared();
-        let back = policy.act_vjp(&observation(n, s), &(2.0 * weight * &s.control))?;
+        let back = policy.act_vjp(&observation(rollout, n), &(2.0 * weight * &s.control))?;
         for i in 0..s.v.len() {
             bar.q[(i, n)] += back.q[i];
             bar.v[(i, n)] += back.v[i];
@@ -117,10 +117,12 @@ fn cost(rollout: &Rollout, along: f64) -> hydrograd::Result<(f64, Cotangents, Ve
 }
 
 /// What the controller saw at a step.
-fn observation(step: usize, s: &Sample) -> Observation<'_> {
+fn observation(rollout: &Rollout, step: usize) -> Observation<'_> {
+    let s = &rollout.samples()[step];
     Observation {
         step,
         time: s.time,
+        time_step: rollout.simulator().time_step(),
         q: &s.q,
         v: &s.v,
         mode: 0,

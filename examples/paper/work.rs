@@ -49,7 +49,7 @@ pub fn by_gains(rollout: &Rollout) -> Result<Vec<f64>> {
             }
         }
         // Torques are the controller's: their cotangent goes through it, to what it observed and to its gains.
-        let back = policy.act_vjp(&observation(n, &pair[0]), &torque_bar)?;
+        let back = policy.act_vjp(&observation(rollout, n), &torque_bar)?;
         for (i, (q, v)) in back.q.iter().zip(&back.v).enumerate() {
             bars.q[(i, n)] += q;
             bars.v[(i, n)] += v;
@@ -64,10 +64,12 @@ pub fn by_gains(rollout: &Rollout) -> Result<Vec<f64>> {
 }
 
 /// What the controller saw at a step.
-fn observation(step: usize, sample: &Sample) -> Observation<'_> {
+fn observation(rollout: &Rollout, step: usize) -> Observation<'_> {
+    let sample = &rollout.samples()[step];
     Observation {
         step,
         time: sample.time,
+        time_step: rollout.simulator().time_step(),
         q: &sample.q,
         v: &sample.v,
         mode: 0,

@@ -871,7 +871,7 @@ class SurfacePressure:
         """Pressure of the flow at the centroids (n,), Pa, zero far away."""
     @property
     def hydrostatic(self) -> _Array:
-        """Pressure of the water at rest there (n,), Pa, zero at the world's origin."""
+        """Pressure of the water at rest (n,), Pa: zero at the world's origin, or under a `waterline` at the water's surface and all above it; of a face that reaches through it the mean over the face."""
     @property
     def at_films(self) -> _Array:
         """How much of each face lies at a gap that a film carries (n,), in parts of it."""
@@ -880,7 +880,7 @@ class SurfacePressure:
         """Force and moment about the body's origin of `pressures` (6,), N and N m, world axes."""
     @property
     def hydrostatic_wrench(self) -> _Array:
-        """The same of `hydrostatic`: buoyancy of the closed surface."""
+        """The same of `hydrostatic`: buoyancy of the closed surface, of what of it is below a `waterline`."""
 
 @final
 class State:

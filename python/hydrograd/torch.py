@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 try:
     import torch
-    from torch.autograd.function import once_differentiable
 except ImportError as error:
     raise ImportError("hydrograd.torch needs PyTorch: pip install torch") from error
 
@@ -229,27 +228,22 @@ class _Run(torch.autograd.Function):
         work, *tensors = inputs
         ctx.set_materialize_grads(False)
         ctx.mark_non_differentiable(*output[work.differentiable :])
-        ctx.work, ctx.began = work, None
-        try:
-            # Copies: what was given may be changed in place.
-            ctx.began = [torch.from_numpy(array.copy()) for array in _arrays(tensors)]
-        except RuntimeError:
-            # In transformations of torch.func only torch knows the numbers.
-            ctx.save_for_backward(*tensors)
-            ctx.save_for_forward(*tensors)
+        ctx.work = work
+        ctx.save_for_backward(*tensors)
+        ctx.save_for_forward(*tensors)
 
     @staticmethod
     def jvp(ctx: Any, *along: Tensor | None) -> Any:
-        began = _began(ctx)
+        began = ctx.saved_tensors
         pairs = zip(began[:_LINEAR], along[1 : _LINEAR + 1], strict=True)
         filled = [torch.zeros_like(x) if part is None else part for x, part in pairs]
         still = (None,) * (3 if isinstance(ctx.work, _Stepping) else 0)
         return (*_Push.apply(ctx.work, *began, *filled), *still)
 
     @staticmethod
-    @once_differentiable
     def backward(ctx: Any, *bars: Tensor | None) -> tuple[Tensor | None, ...]:
-        pulled = _Pull.apply(ctx.work, *_began(ctx), *bars[: ctx.work.differentiable])
+        # A function of what was given too: who differentiates it by that gets an error, and not nothing.
+        pulled = _Pull.apply(ctx.work, *ctx.saved_tensors, *bars[: ctx.work.differentiable])
         needed = ctx.needs_input_grad[1:]
         still = (None,) * (len(needed) - _LINEAR)
         return None, *(part if need else None for need, part in zip(needed, pulled, strict=False)), *still
@@ -258,10 +252,6 @@ class _Run(torch.autograd.Function):
     def vmap(info: Any, dims: Sequence[int | None], work: Work, *tensors: Tensor) -> Any:
         size, work.alone = info.batch_size, False
         return _parted(size, _Run.apply(work, *_joined(size, dims[1:], tensors)))
-
-
-def _began(ctx: Any) -> Sequence[Tensor]:
-    return ctx.saved_tensors if ctx.began is None else ctx.began
 
 
 class _Linear(torch.autograd.Function):
@@ -375,7 +365,8 @@ def _flat(place: str, physics: Physics, parts: Parts) -> tuple[tuple[int, ...], 
     count = len(physics.names)
     values = torch.stack(spread[3 : 3 + count], dim=1) if count else spread[0].new_zeros(batch, 0)
     gains = spread[3 + count] if len(spread) > 3 + count else spread[0].new_zeros(batch, 0)
-    return lead, [*spread[:3], values, gains]
+    # Copies: what was given may be changed in place.
+    return lead, [part.clone() for part in (*spread[:3], values, gains)]
 
 
 def _memory(state: State, lead: tuple[int, ...], physics: Physics) -> list[Tensor]:
@@ -390,7 +381,7 @@ def _memory(state: State, lead: tuple[int, ...], physics: Physics) -> list[Tenso
             raise InputError(f"step: state.{name}: got shape {tuple(tensor.shape)}; must go with {wanted}") from None
 
     return [
-        flat("step", state.step).to(torch.int64),
-        flat("mode", state.mode).to(torch.int64),
-        flat("held", state.held, physics.bodies).to(torch.bool),
+        flat("step", state.step).to(torch.int64, copy=True),
+        flat("mode", state.mode).to(torch.int64, copy=True),
+        flat("held", state.held, physics.bodies).to(torch.bool, copy=True),
     ]

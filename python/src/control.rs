@@ -83,7 +83,11 @@ enum Start {
 }
 
 impl Start {
-    fn of(given: Option<&Bound<'_, PyAny>>, shift: usize, controls: usize) -> PyResult<Self> {
+    fn of(
+        given: Option<&Bound<'_, PyAny>>,
+        shift: usize,
+        (knots, controls): (usize, usize),
+    ) -> PyResult<Self> {
         let unmoved = || match shift {
             0 => Ok(()),
             _ => Err(input(
@@ -105,7 +109,7 @@ impl Start {
             return Ok(Self::Plan(tracking.get().inner.clone(), shift));
         }
         unmoved()?;
-        let shape = [Dim::Any("knots"), Dim::Is(controls)];
+        let shape = [Dim::Is(knots), Dim::Is(controls)];
         Ok(Self::Controls(
             array("ilqr: guess", given, &shape)?.columns(controls),
         ))
@@ -215,7 +219,7 @@ pub fn ilqr<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let me = simulator.get();
     let problem = problem("ilqr", cost, knots, hold, lower, upper, previous)?;
-    let start = Start::of(guess, shift, me.controls_size())?;
+    let start = Start::of(guess, shift, (knots, me.controls_size()))?;
     let state = state.map(|state| state.clone().unbind());
     let settings = IlqrSettings {
         iterations,

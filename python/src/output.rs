@@ -21,8 +21,14 @@ fn frames(place: &str, per_second: Option<f64>, every: Option<isize>) -> PyResul
     match (per_second, every) {
         (None, None) => Ok(Frames::default()),
         (Some(rate), None) => Ok(Frames::PerSecond(rate)),
-        // What isn't a number of states is refused as none is.
-        (None, Some(every)) => Ok(Frames::Every(usize::try_from(every).unwrap_or(0))),
+        (None, Some(every)) => match usize::try_from(every) {
+            Ok(every) => Ok(Frames::Every(every)),
+            Err(_) => Err(input(
+                format!("{place}: every"),
+                every,
+                "must be at least 1, which takes every state",
+            )),
+        },
         (Some(_), Some(every)) => Err(input(
             format!("{place}: every"),
             every.to_string(),

@@ -6,7 +6,7 @@ use crate::nested::ask;
 use hydrograd::simulate::{Action, ActionBar, Observation, Policy};
 use nalgebra::DVector;
 use pyo3::prelude::*;
-use pyo3::types::{PyTuple, PyWeakrefMethods, PyWeakrefReference};
+use pyo3::types::{PyTuple, PyType, PyWeakrefMethods, PyWeakrefReference};
 
 /// A controller written in Python: an object with `act`, and, to be differentiated, `act_vjp`.
 ///
@@ -41,6 +41,14 @@ impl Controller {
         object: &Bound<'_, PyAny>,
         (controls, velocities): (usize, usize),
     ) -> PyResult<Self> {
+        if let Ok(class) = object.cast::<PyType>() {
+            let name = class.name()?;
+            return Err(input(
+                "with_policy: policy",
+                format!("the class {name}"),
+                format!("must be a controller: make one of it, {name}(…)"),
+            ));
+        }
         if !object.hasattr("act")? {
             return Err(input(
                 "with_policy: policy",

@@ -60,7 +60,7 @@ impl SurfacePressure {
         numbers(py, &self.0.pressures)
     }
 
-    /// Pressure of the water at rest there (n,), Pa, zero at the world's origin.
+    /// Pressure of the water at rest (n,), Pa: zero at the world's origin, or under a `waterline` at the water's surface and all above it; of a face that reaches through it the mean over the face.
     #[getter]
     fn hydrostatic<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         numbers(py, &self.0.hydrostatic)
@@ -78,7 +78,7 @@ impl SurfacePressure {
         numbers(py, self.0.wrench().as_slice())
     }
 
-    /// The same of `hydrostatic`: buoyancy of the closed surface.
+    /// The same of `hydrostatic`: buoyancy of the closed surface, of what of it is below a `waterline`.
     #[getter]
     fn hydrostatic_wrench<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         numbers(py, self.0.hydrostatic_wrench().as_slice())

@@ -55,6 +55,8 @@ impl Seen {
         Observation {
             step: 0,
             time: self.time,
+            // A plan goes by the time alone.
+            time_step: 0.0,
             q: &self.q,
             v: &self.v,
             mode: 0,

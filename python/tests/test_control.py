@@ -167,7 +167,7 @@ def test_errors(sim):
     refused("limits of control 0.*wrong way round", lower=1, upper=-1)
     refused("must be one number, or 6", lower=[1.0, 2.0])
     refused("'wide'", lower="wide")
-    refused("guess.*6 × 5", guess=np.zeros((4, 6)))
+    refused(r"guess.*shape \(4, 6\).*shape \(5, 6\)", guess=np.zeros((4, 6)))
     refused("shape", guess=np.zeros((5, 3)))
     refused('"tail".*"nose"', cost.position("tail", (0, 0, 0), 1.0))
     refused("weights.*not negative", cost.effort(-1.0))

@@ -206,6 +206,8 @@ def test_what_cannot_be_written_is_refused(rollout, tmp_path):
     for spacing in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(hg.InputError, match="flow grid: spacing"):
             rollout.write_vtk(tmp_path / "none", flow=(*box, spacing))
+    with pytest.raises(hg.InputError, match="every: got -2; must be at least 1"):
+        rollout.write_gltf(tmp_path / "run.glb", every=-2)
     for options in ({"frames_per_second": 0.0}, {"every": 0}, {"every": -2}, {"every": 2, "frames_per_second": 9.0}):
         with pytest.raises(hg.InputError, match="every|frames per second"):
             rollout.write_vtk(tmp_path / "none", **options)

@@ -84,6 +84,11 @@ def test_a_policy_that_holds_its_simulator_is_collected():
         record.vjp(v=np.zeros(6))
 
 
+def test_a_class_is_no_policy(planar):
+    with pytest.raises(hg.InputError, match=r"the class Spring; must be a controller: make one"):
+        planar.with_policy(Spring)
+
+
 def test_a_policy_that_cannot_be_pointed_at():
     class Slots:
         __slots__ = ()

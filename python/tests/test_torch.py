@@ -65,10 +65,30 @@ def test_backward_passes_leave_the_interpreters_lock(coupled):
 
 
 def test_second_derivatives_are_refused(coupled):
-    controls = tensor(coupled.controls)
-    (slope,) = torch.autograd.grad(ht.rollout(coupled.sim, controls).q.square().sum(), controls, create_graph=True)
-    with pytest.raises(RuntimeError, match="once_differentiable"):
-        slope.sum().backward()
+    """Whichever way they are asked for: a gradient that were a constant would have a Hessian of zero."""
+    start = ht.initial_state(coupled.sim)
+    # Costs whose own slope doesn't depend on the run are linear in what it gives, and their Hessians the run's alone.
+    costs = [
+        lambda u: ht.rollout(coupled.sim, u).q.square().sum(),
+        lambda u: ht.rollout(coupled.sim, u).q.sum(),
+        lambda u: ht.step(coupled.sim, start, u[0]).v.sum(),
+    ]
+    controls, ones = tensor(coupled.controls), torch.ones_like(tensor(coupled.controls))
+    autograd, func = torch.autograd.functional, torch.func
+    for cost in costs:
+        (slope,) = torch.autograd.grad(cost(controls), controls, create_graph=True)
+        ways = [
+            lambda slope=slope: slope.sum().backward(),
+            lambda cost=cost: autograd.hessian(cost, controls),
+            lambda cost=cost: autograd.hvp(cost, controls, ones),
+            lambda cost=cost: autograd.vhp(cost, controls, ones),
+            lambda cost=cost: func.hessian(cost)(controls.detach()),
+            lambda cost=cost: func.jacrev(func.jacrev(cost))(controls.detach()),
+            lambda cost=cost: func.jacrev(func.jacfwd(cost))(controls.detach()),
+        ]
+        for way in ways:
+            with pytest.raises(hg.UnsupportedError, match="derivatives of derivatives"):
+                way()
 
 
 def test_what_is_changed_afterwards_does_not_matter(coupled):

@@ -5,7 +5,7 @@ use super::shape::ContactShape;
 use super::{core_core, cylinder, cylinder_pair, plane, round_core, round_pair};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity};
 use crate::geometry::convex::Form;
-use crate::geometry::{Casing, HalfSpace, Neighbours, Other, Pairing, Region, Wall};
+use crate::geometry::{Ball, Casing, HalfSpace, Neighbours, Other, Pairing, Region, Wall};
 use crate::{Error, Result};
 
 /// Two surfaces that may come in contact.
@@ -160,17 +160,25 @@ impl Contacts {
         &self.shapes[b]
     }
 
-    /// Radius of body `b`, m: of the ball around it, or, of several pieces, half the diagonal of their bounds; none without surface.
-    pub fn radius(&self, b: usize) -> Option<f64> {
+    /// A ball around body `b`, in its frame; of several pieces around their bounds; none without surface.
+    pub fn ball(&self, b: usize) -> Option<Ball> {
         match self.pieces(b) {
             [] => None,
-            [whole] => Some(whole.radius()),
+            [whole] => Some(whole.ball()),
             pieces => {
                 let joined = |x: [Vec3; 2], y: [Vec3; 2]| [x[0].inf(&y[0]), x[1].sup(&y[1])];
                 let bounds = pieces.iter().map(ContactShape::bounds).reduce(joined);
-                bounds.map(|[low, high]| 0.5 * (high - low).norm())
+                bounds.map(|[low, high]| Ball {
+                    center: 0.5 * (low + high),
+                    radius: 0.5 * (high - low).norm(),
+                })
             }
         }
+    }
+
+    /// Radius of that ball, m.
+    pub fn radius(&self, b: usize) -> Option<f64> {
+        self.ball(b).map(|ball| ball.radius)
     }
 
     /// Where the surfaces of a pair are near, the bodies being at `poses`; all places with a gap under `distance` (m) and some beyond,

@@ -61,7 +61,12 @@ impl ContactShape {
         self.solid.bounds()
     }
 
-    /// Radius of the ball around the body, m.
+    /// A ball around the body, frame of the body.
+    pub fn ball(&self) -> Ball {
+        self.ball
+    }
+
+    /// Its radius, m.
     pub fn radius(&self) -> f64 {
         self.ball.radius
     }

@@ -30,6 +30,8 @@ pub struct Observation<'a> {
     pub step: usize,
     /// Time, s.
     pub time: f64,
+    /// How long the step is, s.
+    pub time_step: f64,
     /// Joint coordinates.
     pub q: &'a DVector<f64>,
     /// Generalised velocity.

@@ -1,11 +1,11 @@
 //! Controls that were found before.
 
-use super::{Action, ActionBar, Observation, Policy, expect, steps_at};
+use super::{Action, ActionBar, Observation, Policy, ROUNDING, expect};
 use crate::Result;
 use nalgebra::DVector;
 
-/// Given controls, each for as long as a step; nothing after the last one. What runs with shorter or longer steps is given what was meant for the time at which each
-/// of its steps begins. Gains: the controls of all rows in turn.
+/// Given controls, each for as long as a step; nothing after the last one. What runs with other steps is given the mean of what was meant for each of its steps: a step within a
+/// row has that row, one over several rows all of them for as long as each lasts, and nothing for what lies beyond the last. Gains: the controls of all rows in turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
     /// Number of controls of the system.
@@ -17,24 +17,41 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// Which controls are those of a time.
-    fn row(&self, time: f64) -> usize {
-        steps_at(time, self.time_step) as usize
+    /// The rows that a step goes over, each with its part of the step.
+    fn rows(&self, observed: &Observation) -> Vec<(usize, f64)> {
+        let length = observed.time_step / self.time_step;
+        // Whole but for rounding is whole.
+        let whole = |rows: f64| match (rows - rows.round()).abs() < ROUNDING * length.min(1.0) {
+            true => rows.round(),
+            false => rows,
+        };
+        let begin = whole(observed.time / self.time_step);
+        let end = whole(begin + length);
+        let last = end.ceil().min(self.steps.len() as f64) as usize;
+        let part = |row: usize| {
+            let (from, to) = (row as f64, row as f64 + 1.0);
+            (row, (end.min(to) - begin.max(from)) / (end - begin))
+        };
+        (begin.floor() as usize..last).map(part).collect()
     }
 }
 
 impl Policy for Playback {
     fn act(&self, observed: &Observation) -> Result<Action> {
-        let control = self.steps.get(self.row(observed.time)).cloned();
-        Ok(Action::control(control.unwrap_or_default()))
+        let mut control = vec![0.0; self.controls];
+        for (row, part) in self.rows(observed) {
+            for (u, given) in control.iter_mut().zip(&self.steps[row]) {
+                *u += part * given;
+            }
+        }
+        Ok(Action::control(control))
     }
 
     fn act_vjp(&self, observed: &Observation, control_bar: &DVector<f64>) -> Result<ActionBar> {
         let mut gains = vec![0.0; self.controls * self.steps.len()];
-        let row = self.row(observed.time);
-        if row < self.steps.len() {
-            let from = self.controls * row;
-            gains[from..from + self.controls].copy_from_slice(control_bar.as_slice());
+        for (row, part) in self.rows(observed) {
+            let own = gains[self.controls * row..].iter_mut().zip(control_bar);
+            own.for_each(|(gain, bar)| *gain = part * bar);
         }
         Ok(ActionBar::gains(gains))
     }

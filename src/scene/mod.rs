@@ -32,7 +32,7 @@ pub use crate::shape::Shape;
 pub use build::BodyId;
 pub(crate) use carriers::Carriers;
 pub use contact::{CollisionPiece, Contact};
-pub(crate) use force::{AXES, least_damping};
+pub(crate) use force::{AXES, BUOYANT_ANYWHERE, least_damping};
 pub use force::{
     Coefficients, Current, Damping, Edge, Fin, Float, Force, Lubrication, Spring, Tendon, Thruster,
     WATER_VISCOSITY,
@@ -331,7 +331,7 @@ pub enum Controller {
         /// negative, from below otherwise.
         stop_at: f64,
     },
-    /// Given controls, each for as long as a step of the scene, and nothing after the last: an optimised trajectory to be run again, with steps of another length as well.
+    /// Given controls, each for as long as a step of the scene, and nothing after the last: an optimised trajectory to be run again, with steps of another length as well: one that goes over several has their mean.
     Playback {
         /// One row per step, in it one per control, N or N m.
         control: Vec<Vec<f64>>,

@@ -212,11 +212,9 @@ impl Robot {
     }
 
     fn import(&self, path: &Path) -> Result<Imported> {
-        let given = |field: &str, values: &[f64]| {
-            super::validate::finite(&format!("{}: {field}", path.display()), values)
-        };
-        given("position", &self.position)?;
-        given("rotation", &self.rotation)?;
+        let place = |field: &str| format!("{}: {field}", path.display());
+        super::validate::finite(&place("position"), &self.position)?;
+        super::validate::rotation(&place("rotation"), &self.rotation)?;
         if let Some(faces) = self.faces.filter(|faces| !(20..=20_000).contains(faces)) {
             return Err(Error::input(
                 format!("{}: faces", path.display()),

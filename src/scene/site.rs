@@ -73,7 +73,7 @@ impl Scene {
             self.named_body(&site.body, place("body"))?;
             let Placement { position, rotation } = &site.placement;
             super::validate::finite(&place("placement.position"), position)?;
-            super::validate::finite(&place("placement.rotation"), rotation)?;
+            super::validate::rotation(&place("placement.rotation"), rotation)?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Simulations: settings, controllers, rollouts and their gradients.
 
+mod above_water;
 mod allocation;
 mod batch;
 mod checkpoint;

@@ -29,7 +29,7 @@ pub struct SurfacePressure {
     pub velocities: Vec<Vec3>,
     /// Pressure of the flow at the centroids, Pa, zero far away.
     pub pressures: Vec<f64>,
-    /// Pressure of the water at rest there, Pa, zero at the world's origin.
+    /// Pressure of the water at rest, Pa: zero at the world's origin, or under a `waterline` at the water's surface and all above it, of a face that reaches through it the mean over the face.
     pub hydrostatic: Vec<f64>,
     /// How much of each face lies at a gap that a film carries, in parts of it: there the pressure is that of the film, which is the same across the gap.
     pub at_films: Vec<f64>,
@@ -42,7 +42,7 @@ impl SurfacePressure {
         self.sum(&self.pressures)
     }
 
-    /// The same of the water at rest: buoyancy of the closed surface.
+    /// The same of the water at rest: buoyancy of the closed surface, of what of it is below a `waterline`.
     pub fn hydrostatic_wrench(&self) -> Vec6 {
         self.sum(&self.hydrostatic)
     }
@@ -63,6 +63,7 @@ impl Simulator {
         let density = self.parameters().density();
         let gravity = Vec3::from(self.scene().gravity);
         let (current, streams) = (self.system().current, &self.system().streams);
+        let surface = self.scene().waterline.map(|_| streams.surface());
         let of = |flow: BodyFlow| {
             let (faces, pose) = (flow.faces(), &flow.pose);
             let (mut velocities, mut dynamic) = flow.water();
@@ -86,12 +87,36 @@ impl Simulator {
                     .map(|u| pose.rotation * u + current)
                     .collect(),
                 pressures: dynamic.iter().map(|p| density * p).collect(),
-                hydrostatic: centres.iter().map(|x| density * gravity.dot(x)).collect(),
+                hydrostatic: match surface {
+                    None => centres.iter().map(|x| density * gravity.dot(x)).collect(),
+                    Some(surface) => {
+                        let depth = |x: &Vec3| surface.depth(&pose.apply(x));
+                        let each = faces.corners.iter().zip(&faces.centres);
+                        let means = each
+                            .map(|(corners, x)| wet_depth(corners.map(|c| depth(&c)), depth(x)));
+                        means.map(|mean| density * gravity.norm() * mean).collect()
+                    }
+                },
                 centres,
             }
         };
         let flows = self.surface_flow(sample, Some(gains), Streams::LeftOut)?;
         Ok(flows.into_iter().map(of).collect())
+    }
+}
+
+/// Mean over a face of how deep it is below the water's surface, m, what is above it counting as nothing: from the depths of its corners and that of its centroid, which is theirs where the face is flat.
+fn wet_depth(corners: [f64; 3], centre: f64) -> f64 {
+    let curved = centre - corners.iter().sum::<f64>() / 3.0;
+    let mut depths = corners.map(|d| d + curved);
+    depths.sort_by(f64::total_cmp);
+    let [a, b, c] = depths;
+    // A corner cut off alone is similar to a triangle with two of the face's edges.
+    match depths {
+        _ if a >= 0.0 => centre,
+        _ if c <= 0.0 => 0.0,
+        _ if b <= 0.0 => c * (c / (c - a)) * (c / (c - b)) / 3.0,
+        _ => centre - a * (a / (a - b)) * (a / (a - c)) / 3.0,
     }
 }
 

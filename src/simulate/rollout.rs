@@ -162,7 +162,7 @@ impl Rollout {
 
     /// What the user should know about this trajectory, with names and numbers: gaps that the
     /// meshes don't resolve, and bodies in one another with the fidelity `isolated`; drag too stiff for an explicit integrator's step, and
-    /// energy that comes from nowhere.
+    /// energy that comes from nowhere; bodies that leave water which doesn't end with its surface.
     pub fn warnings(&self) -> Vec<String> {
         // Where bodies don't feel each other nothing is to be resolved.
         let coupled = self.simulator.fidelity_acting().coupled();
@@ -176,7 +176,8 @@ impl Rollout {
             .chain(self.loss_warning())
             .chain(self.rest_warning());
         let all = all.chain(self.passing_warning());
-        all.chain(self.coarse_warning()).collect()
+        let all = all.chain(self.coarse_warning());
+        all.chain(self.above_water_warnings()).collect()
     }
 
     /// The gap whose viscous water was resolved worst, where it wasn't.

@@ -5,7 +5,8 @@
 //! them. So a run without the latter is told from a small part of its energy on, one with them where it runs away.
 
 use super::{Rollout, Sample, Simulator};
-use crate::adjoint::lie::{Vec6, angular, point_velocity};
+use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity};
+use crate::adjoint::rigid::inertia_matrix;
 use crate::dynamics::{Drive, System};
 use crate::error::readable;
 use nalgebra::DVector;
@@ -177,13 +178,17 @@ impl Rollout {
         }
         let twists = tree.twists(&tree.kinematics(&s.q), &driven);
         let of = |(b, twist): (usize, &Vec6)| {
-            let body = &system.bodies[b];
-            let mass = parameters.mass(b) + parameters.density() * body.volume;
-            let speed = point_velocity(twist, &s.poses[b].translation).norm();
-            let turning = body.volume.cbrt() * angular(twist).norm();
-            let water = system.water_velocity(&s.poses[b].translation, s.time, parameters);
-            let square = speed.powi(2) + turning.powi(2) + water.norm_squared();
-            0.5 * mass * square
+            let (body, pose) = (&system.bodies[b], &s.poses[b]);
+            let (mass, displaced) = (parameters.mass(b), parameters.density() * body.volume);
+            let square = |x: &Vec3| point_velocity(twist, &pose.apply(x)).norm_squared();
+            // The body's own is known to the last digit: a dry one far off its axis has no other.
+            let turning = pose.rotation.tr_mul(&angular(twist));
+            let turned = inertia_matrix(&parameters.inertia(b)) * turning;
+            let own = mass * square(&parameters.center_of_mass(b)) + turning.dot(&turned);
+            let around = body.volume.cbrt().powi(2) * turning.norm_squared();
+            let moved = displaced * (square(&parameters.center_of_buoyancy(b)) + around);
+            let water = system.water_velocity(&pose.translation, s.time, parameters);
+            0.5 * (own + moved + (mass + displaced) * water.norm_squared())
         };
         twists.iter().enumerate().map(of).sum()
     }

@@ -193,7 +193,7 @@ impl ControlledStep<'_, '_> {
     ) -> Result<()> {
         let (t, record) = (self.trajectory, self.step.record());
         let state = record.state();
-        let seen = observation(state, record.velocity(), t.stepper.time(state));
+        let seen = observation(&t.stepper, state, record.velocity());
         let policy = t.simulator.policy();
         for c in 0..control.nrows() {
             let bar = DVector::from_fn(control.nrows(), |i, _| f64::from(i == c));

@@ -96,7 +96,7 @@ impl<'a> Trajectory<'a> {
         state: &State,
         sample: &Sample,
     ) -> Result<(Input, usize)> {
-        let seen = observation(state, &sample.v, sample.time);
+        let seen = observation(&self.stepper, state, &sample.v);
         let action = self.simulator.policy().act(&seen)?;
         let mode = action.mode;
         expect_length("hold", action.hold.len(), self.stepper.system.len(), "body")?;
@@ -249,7 +249,7 @@ impl<'a> ControlledStep<'_, 'a> {
         let (t, record) = (self.trajectory, self.step.record());
         let mut bar = self.step.vjp(next_bar)?;
         let state = record.state();
-        let seen = observation(state, record.velocity(), t.stepper.time(state));
+        let seen = observation(&t.stepper, state, record.velocity());
         let policy = t.simulator.policy();
         let action = policy.act_vjp(&seen, &bar.control)?;
         let velocities = t.stepper.system.tree.velocities();
@@ -307,10 +307,15 @@ fn observables_vjp(
 }
 
 /// What the controller sees at a state.
-pub(super) fn observation<'a>(state: &'a State, v: &'a DVector<f64>, time: f64) -> Observation<'a> {
+pub(super) fn observation<'a>(
+    stepper: &Stepper,
+    state: &'a State,
+    v: &'a DVector<f64>,
+) -> Observation<'a> {
     Observation {
         step: state.step,
-        time,
+        time: stepper.time(state),
+        time_step: stepper.dt,
         q: &state.q,
         v,
         mode: state.mode,

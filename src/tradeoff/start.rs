@@ -65,6 +65,7 @@ fn first_action(simulator: &Simulator) -> Result<(DVector<f64>, Vec<bool>)> {
     let action = simulator.policy().act(&Observation {
         step: 0,
         time: 0.0,
+        time_step: simulator.time_step(),
         q,
         v,
         mode: 0,

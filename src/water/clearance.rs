@@ -323,7 +323,7 @@ impl Clearance {
     pub fn estimated(&self, time: f64, gap: &Gap, error: GapError) -> Option<String> {
         (error.force > TOLD).then(|| {
             format!(
-                "{}: the smallest gap, {:.3e} m at t = {} s, is narrower than is resolved with edges of {:.3e} m: the force of the water across it, by {}, may be off by \
+                "{}: the gap whose water is estimated to be furthest off, {:.3e} m at t = {} s, is narrower than is resolved with edges of {:.3e} m: the force of the water across it, by {}, may be off by \
                  {:.0} %, the added mass along it by {:.1} % (estimated; `check_gap` measures it); use more faces, refine the bodies there (`refine`), or end the run before{}",
                 self.place(gap),
                 gap.distance.max(0.0),

@@ -195,6 +195,20 @@ fn buoyancies_that_can_not_be_are_refused() {
         &|s| s.bodies[0].center_of_buoyancy = Some([0.0; 3]),
         &["body \"rov\": center_of_buoyancy", "`volume`"],
     );
+    // Under a surface no float, by a parameter neither.
+    let mut scene = water();
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.waterline = Some(10.0);
+    scene.add(Body::dry().named("rov").mass(1.0).inertia([0.1; 3]));
+    let mut floating = scene.clone();
+    add(Float::new("rov").volume(1e-3))(&mut floating);
+    let words = ["volume", "0.001", "buoyant at any height", "waterline"];
+    says(floating.validate().unwrap_err(), &words);
+    add(Float::new("rov").mass(0.1).named("ballast"))(&mut scene);
+    let mut sim = simulator(&scene, Integrator::Rk4);
+    let mut parameters = sim.parameters().clone();
+    parameters.set("ballast.volume", 1e-3).unwrap();
+    says(sim.set_parameters(parameters).unwrap_err(), &words);
     // A parameter of a body that the scene gives no volume.
     let mut scene = water();
     scene.add(Body::dry().named("rov").mass(1.0).inertia([0.1; 3]));

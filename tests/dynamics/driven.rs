@@ -141,7 +141,7 @@ fn a_locked_joint_takes_no_velocity() {
     says(start.unwrap_err(), &["initial v: lid", "locked", "give 0"]);
 }
 
-/// Controls that are played back are those of their times, with steps of any length: a shorter one plays each for as long.
+/// Controls that are played back are those of their times, with steps of any length: a shorter one plays each for as long, a longer one the mean of several.
 #[test]
 fn playback_keeps_time() {
     let mut scene = Scene::new(Fluid::none());
@@ -167,5 +167,14 @@ fn playback_keeps_time() {
         let last = rollout.samples().last().unwrap();
         assert!((last.v[0] - speed).abs() < 1e-12, "{parts}: {}", last.v);
         assert!((last.q[0] - place).abs() < 1e-12, "{parts}: {}", last.q);
+    }
+    // A longer step has the mean of its rows, which may end in one, and of nothing after the last.
+    for (time_step, steps) in [(0.04, 25), (0.05, 20), (0.03, 34), (1.0, 1), (1.5, 1)] {
+        let settings = Settings::default().time_step(time_step);
+        let simulator = Simulator::new(&scene, settings).unwrap();
+        let controls = Controls::zeros(&simulator, steps);
+        let rollout = simulator.rollout(&controls).unwrap();
+        let last = &rollout.samples()[steps].v;
+        assert!((last[0] - speed).abs() < 1e-12, "{time_step}: {last}");
     }
 }

@@ -365,6 +365,19 @@ fn tasks_that_do_not_fit_are_refused() {
     );
     fails(&|t| t.fingers.truncate(1), &["fingers", "at least 2"]);
     fails(
+        &|t| t.fingers[0].body = "ball".into(),
+        &["finger", "\"ball\"", "another body than the object"],
+    );
+    fails(
+        &|t| t.fingers[1].body = "left".into(),
+        &["finger", "\"left\"", "another finger has"],
+    );
+    // From the middle of a finger its corners are 0.287 m away.
+    fails(
+        &|t| t.fingers[0].pad = [0.3, 0.0, 0.0],
+        &["pad", "\"left\"", "3.000e-1 m", "within 2.872e-1 m"],
+    );
+    fails(
         &|t| t.fingers[0].pad[1] = f64::NAN,
         &["pad", "left", "finite"],
     );

@@ -1,8 +1,8 @@
 //! Bodies at the surface of the water: displaced volume, stiffness, energy, drag, gradients.
 
-use crate::support::check_gradient;
+use crate::support::{check_gradient, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Drag, DragPart, Fluid, Joint, Scene, Shape};
+use hydrograd::scene::{Body, Drag, DragPart, Fin, Fluid, Force, Joint, Scene, Shape};
 use hydrograd::simulate::gradcheck::{GradcheckSettings, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
@@ -273,6 +273,56 @@ fn given_volumes_and_centres_are_buoyant_below_a_surface() {
     let mut sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
     keeps_energy(&sim, 2e-4);
     check_gradient("given volumes", &mut sim, 30, 3, 1e-6);
+}
+
+/// What of the water a surface doesn't end is told of bodies that are above it, once a body, with the time and the height.
+#[test]
+fn bodies_above_the_surface_are_told() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -GRAVITY];
+    scene.waterline = Some(HEIGHT);
+    scene.time_step = 1e-3;
+    let ball = || Body::new(Shape::sphere(0.1)).density(DENSITY);
+    let at = |x: f64, height: f64| [x, 0.0, HEIGHT + height];
+    scene.add(ball().named("high").at(at(0.0, 10.0)));
+    scene.add(ball().named("deep").at(at(1.0, -10.0)));
+    scene.add(ball().named("floating").at(at(2.0, 0.0)));
+    scene.add(
+        ball()
+            .named("weightless")
+            .added_mass([[0.0; 6]; 6])
+            .at(at(3.0, 10.0)),
+    );
+    let mast = Body::dry().mass(1.0).inertia([0.1; 3]);
+    scene.add(mast.clone().named("mast").at(at(4.0, 1.0)));
+    scene.add(mast.named("wing").at(at(5.0, 1.0)));
+    let fin = Fin {
+        area: 0.01,
+        lift_slope: 3.0,
+        ..Fin::new("wing")
+    };
+    scene.add_force(Force::Fin(fin));
+    scene.add(ball().named("thrown").at(at(6.0, -0.2)));
+    let mut sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    let told = |sim: &Simulator| {
+        let controls = Controls::zeros(sim, 100);
+        sim.rollout(&controls).unwrap().warnings()
+    };
+    let found = told(&sim);
+    assert_eq!(found.len(), 2, "{found:?}");
+    says(
+        &found[0],
+        &["\"high\"", "t = 0 s", "by 9.", "its added mass"],
+    );
+    says(&found[1], &["\"wing\"", "t = 0 s", "1.000e0 m", "fin 1"]);
+    // Up through the surface at 5 m/s: out of it 0.3 m later.
+    let velocities = sim.start().1.len();
+    scene.initial.v = vec![0.0; velocities];
+    scene.initial.v[velocities - 4] = 5.0;
+    sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    let found = told(&sim);
+    assert_eq!(found.len(), 3, "{found:?}");
+    says(&found[2], &["\"thrown\"", "t = 0.06"]);
 }
 
 /// A surface needs gravity.

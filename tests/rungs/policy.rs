@@ -67,7 +67,7 @@ fn wave() -> Wave {
     }
 }
 
-/// Five steps, one of them observed.
+/// Five steps; what is observed is one of them and half of the next.
 fn playback() -> Playback {
     let steps = (0..5).map(|n| vec![0.3 + f64::from(n), -0.7 * f64::from(n)]);
     Playback {
@@ -86,6 +86,7 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
         let observed = Observation {
             step: 3,
             time: 0.03,
+            time_step: 0.015,
             q,
             v,
             mode: 0,
@@ -97,6 +98,7 @@ fn act(policy: &dyn Policy, c: f64) -> Outcome {
     let observed = Observation {
         step: 3,
         time: 0.03,
+        time_step: 0.015,
         q: &q,
         mode: 0,
         v: &v,
@@ -148,6 +150,7 @@ fn push_then_lock(c: f64) -> Outcome {
     let observed = Observation {
         step: 3,
         time: 0.03,
+        time_step: 0.015,
         q: &q,
         mode: 0,
         v: &v,
@@ -176,6 +179,7 @@ fn speed_stages(c: f64) -> Outcome {
     let observed = Observation {
         step: 3,
         time: 0.03,
+        time_step: 0.015,
         q: &q,
         mode: 0,
         v: &v,
@@ -227,6 +231,7 @@ fn open_loop(c: f64) -> Outcome {
     let observed = Observation {
         step: 0,
         time: 0.0,
+        time_step: 0.01,
         q: &q,
         mode: 0,
         v: &v,

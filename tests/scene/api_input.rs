@@ -2,10 +2,11 @@
 
 use crate::support::{example, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Preset, Scene};
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Preset, Scene};
 use hydrograd::simulate::{Action, ActionBar, Method, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
+use std::f64::consts::FRAC_PI_2;
 
 fn simulator(name: &str) -> Simulator {
     let settings = Settings::default().faces(80).fidelity(Fidelity::Isolated);
@@ -271,6 +272,28 @@ fn energy_from_nowhere_is_told() {
     assert!(told[0] > 0 && told[1] > 0, "{told:?}");
     let implicit = Simulator::new(&stiff, settings.integrator(Integrator::MomentumEuler)).unwrap();
     assert!(implicit.rollout(&controls).unwrap().warnings().is_empty());
+}
+
+/// What a motion gives is no energy from nowhere, of a dry body in or far off its axis as well.
+#[test]
+fn energy_of_a_given_motion_is_told_of_nobody() {
+    for center in [0.0, 0.3] {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        let axis = [1.0, 0.0, 0.0];
+        let crank = Body::dry().mass(1.0).inertia([0.03, 0.001, 0.03]);
+        let crank = crank.center_of_mass([0.0, center, 0.0]);
+        let from_rest = Motion::Sine {
+            offset: 0.0,
+            amplitude: 0.5,
+            frequency: 6.0,
+            phase: FRAC_PI_2,
+        };
+        scene.add(crank.joint(Joint::Revolute { axis }).driven([from_rest]));
+        let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 50)).unwrap();
+        assert!(rollout.samples()[50].kinetic_energy > 0.0);
+        assert_eq!(rollout.warnings(), Vec::<String>::new());
+    }
 }
 
 #[test]

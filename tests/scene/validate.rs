@@ -284,6 +284,15 @@ fn shapes_and_drag_are_checked() {
         |s| s.bodies[1].shape_at.rotation[0] = f64::NAN,
         &["body \"coin\": shape_at.rotation", "finite"],
     );
+    // Its square has no number.
+    refused(
+        |s| s.bodies[1].placement.rotation[0] = 1e155,
+        &["body \"coin\": placement.rotation", "1e155", "at most 1e6"],
+    );
+    refused(
+        |s| s.bodies[1].shape_at.rotation = [6e5, 6e5, -6e5],
+        &["body \"coin\": shape_at.rotation", "at most 1e6"],
+    );
     let drag = |linear, quadratic| Drag {
         linear,
         quadratic,

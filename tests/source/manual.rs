@@ -18,7 +18,8 @@ fn help(arguments: &[&str]) -> String {
 fn the_page_on_the_command_line_is_what_the_program_says() {
     let mut page = format!(
         "# The command line\n\n`cargo install --path . --locked --features cli`, or the Python package, brings the program. It ends with 0 where all went well, \
-         with 1 and a message on standard error where not, and with 2 where its arguments can't be read.\n\n```text\n{}\n```\n",
+         with 1 and a message on standard error where not, and with 2 where its arguments can't be read. Ctrl-C ends it with 130 at once; while `run` makes steps the first one waits for the step under way, what ran is \
+         written, and it ends with 1.\n\n```text\n{}\n```\n",
         help(&["--help"])
     );
     for command in [

@@ -279,6 +279,41 @@ fn a_sphere_that_moves_steadily_has_the_pressure_of_the_books() {
     assert!((made.hydrostatic_wrench()[2] / lifted - 1.0).abs() < 2e-3);
 }
 
+/// Below a waterline the water at rest lifts a box as its buoyancy does, faces that reach through the surface included; above it there is none.
+#[test]
+fn hydrostatic_pressure_ends_at_the_waterline() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.waterline = Some(0.5);
+    let cube = || Shape::cuboid([0.1; 3]);
+    let tilted = Body::new(cube()).at([1.0, 0.0, 0.51]);
+    scene.add(Body::new(cube()).density(500.0).at([0.0, 0.0, 0.52]));
+    scene.add(tilted.density(500.0).rotated([0.4, -0.3, 0.2]));
+    scene.add(Body::new(cube()).density(500.0).at([2.0, 0.0, 0.1]));
+    scene.add(Body::new(cube()).density(500.0).at([3.0, 0.0, 2.0]));
+    let run = at_start(&scene, Settings::default().fidelity(Fidelity::Isolated));
+    let loads = run.loads(0).unwrap();
+    let lifted = loads.wrenches("buoyancy").unwrap();
+    let full = 998.0 * 9.81 * 1e-3;
+    for made in run.pressure(0).unwrap() {
+        let force: Vec3 = made.hydrostatic_wrench().fixed_rows::<3>(0).into_owned();
+        let right: Vec3 = lifted[made.body].fixed_rows::<3>(0).into_owned();
+        assert!((force - right).norm() < 1e-10 * full, "{force} {right}");
+        for (p, x) in made.hydrostatic.iter().zip(&made.centres) {
+            // The mean over a face that is cut is more than that of its centre.
+            let at_centre = 998.0 * 9.81 * (0.5 - x.z).max(0.0);
+            assert!(*p >= at_centre - 1e-9, "{p} {at_centre}");
+            if (0.5 - x.z).abs() > 0.1 {
+                assert!((p - at_centre).abs() < 1e-9 * full.max(at_centre), "{p}");
+            }
+        }
+    }
+    let [a, .., dry] = lifted else {
+        panic!("four bodies")
+    };
+    assert!((a[2] / (0.3 * full) - 1.0).abs() < 1e-9 && *dry == Vec6::zeros());
+}
+
 #[test]
 fn pressures_that_are_not_known_are_refused() {
     let run = |scene: &Scene, fidelity| at_start(scene, Settings::default().fidelity(fidelity));

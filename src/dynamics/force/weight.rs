@@ -3,13 +3,15 @@
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::parameters::{
-    DENSITY, Declarations, Declared, Owner, Parameter, Parameters, center_of_buoyancy,
+    DENSITY, Declarations, Declared, Owner, Parameter, Parameters, Range, center_of_buoyancy,
     center_of_mass, mass, volume,
 };
-use crate::scene::Force;
+use crate::scene::{BUOYANT_ANYWHERE, Force};
 
 /// Of a float.
 const VOLUME: Declared = Declared::new("volume", "m³");
+/// Under a surface, where a scene refuses it too.
+const NO_VOLUME: Declared = VOLUME.range(Range::Zero(BUOYANT_ANYWHERE));
 
 struct Weight {
     name: &'static str,
@@ -70,6 +72,10 @@ pub(super) fn floats(
     parameters: &mut Declarations,
 ) -> Option<Box<dyn ForceModel>> {
     let scene = parts.scene;
+    let volume = match parts.waterline {
+        Some(_) => NO_VOLUME,
+        None => VOLUME,
+    };
     let mut parcels = Vec::new();
     for (i, force) in scene.forces.iter().enumerate() {
         let Force::Float(given) = force else { continue };
@@ -78,7 +84,7 @@ pub(super) fn floats(
             body: scene.body(&given.body).map_or(0, |b| b.0),
             point: Point::Fixed(given.at.into()),
             of: DENSITY,
-            volume: Some(parameters.declare(owner, VOLUME, given.volume)),
+            volume: Some(parameters.declare(owner, volume, given.volume)),
         });
     }
     // Without gravity, too: their volumes are parameters, and tell where the centre of buoyancy is.

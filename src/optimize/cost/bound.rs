@@ -5,6 +5,7 @@ use super::{CostPoint, CustomCost, Quadratic, Target};
 use crate::simulate::Simulator;
 use crate::{Error, Result};
 use nalgebra::DVector;
+use std::fmt;
 use std::sync::Arc;
 
 /// Numbers of a simulator that a cost is made for.
@@ -15,6 +16,13 @@ pub(in crate::optimize) struct Sizes {
     /// nv.
     pub velocities: usize,
     pub controls: usize,
+}
+
+impl fmt::Display for Sizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (q, v, u) = (self.coordinates, self.velocities, self.controls);
+        write!(f, "{q} coordinates, {v} velocities and {u} controls")
+    }
 }
 
 impl Sizes {

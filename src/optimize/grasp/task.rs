@@ -51,6 +51,9 @@ const STILL: f64 = 0.025;
 /// Most cosine between the normals of two fingers that hold something between them.
 const OPPOSED: f64 = -0.2;
 
+/// Part of a finger's size by which a point on its edge may be off.
+const ROUNDING: f64 = 1e-6;
+
 /// Part of the run over whose end the cost of the hold is taken, in times that it should be held.
 const SPAN: f64 = 1.2;
 
@@ -71,7 +74,7 @@ impl Grip {
     }
 
     /// # Errors
-    /// Names that no body has, fewer than two fingers, lists of another length than the simulator has controls, numbers out of range, a scene without
+    /// Names that no body has, fewer than two fingers, one that is the object or another one, points off their fingers, lists of another length than the simulator has controls, numbers out of range, a scene without
     /// contact, an object without a surface, or a hold longer than the run.
     pub fn new(simulator: &Simulator, task: &GraspTask) -> Result<Self> {
         let names = simulator.names();
@@ -91,7 +94,16 @@ impl Grip {
                 let place = format!("grasp: pad of finger {:?}", finger.body);
                 return Err(Error::input(place, bad, "must be finite"));
             }
-            fingers.push((body("finger", &finger.body)?, Vec3::from(finger.pad)));
+            let b = body("finger", &finger.body)?;
+            let taken = match fingers.iter().any(|(other, _)| *other == b) {
+                true => Some("must be a body of its own: another finger has this one"),
+                false => (b == object).then_some("must be another body than the object"),
+            };
+            if let Some(expected) = taken {
+                let name = format!("{:?}", finger.body);
+                return Err(Error::input("grasp: finger", name, expected));
+            }
+            fingers.push((b, Vec3::from(finger.pad)));
         }
         if fingers.len() < 2 {
             let expected = "must be at least 2";
@@ -133,17 +145,31 @@ impl Grip {
             why: "nothing holds what passes through it".into(),
             instead: "give the scene a [contact] section".into(),
         })?;
-        let radius = contact.shapes.radius(object).ok_or_else(|| {
+        let ball = contact.shapes.ball(object).ok_or_else(|| {
             let expected = "must have a shape";
             Error::input("grasp: object", format!("{:?}", task.object), expected)
         })?;
+        for (finger, (b, pad)) in task.fingers.iter().zip(&fingers) {
+            let Some(around) = contact.shapes.ball(*b) else {
+                continue;
+            };
+            let off = (pad - around.center).norm();
+            if off > (1.0 + ROUNDING) * around.radius {
+                let expected = format!(
+                    "must be a point of its surface, in the body's frame: this one is {off:.3e} m from its middle, of which all of it is within {:.3e} m",
+                    around.radius
+                );
+                let place = format!("grasp: pad of finger {:?}", finger.body);
+                return Err(Error::input(place, format!("{:?}", finger.pad), expected));
+            }
+        }
         Ok(Self {
             object,
             fingers,
             closing: task.closing.clone(),
             limits: task.limits.clone(),
             hold: task.hold,
-            radius,
+            radius: ball.radius,
             duration,
         })
     }

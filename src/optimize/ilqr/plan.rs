@@ -101,7 +101,7 @@ impl Guess<'_> {
                 if given.shape() != right || given.iter().any(|x| !x.is_finite()) {
                     let what = match given.shape() == right {
                         true => "an entry that isn't finite".into(),
-                        false => format!("{:?}", given.shape()),
+                        false => format!("{} × {}", given.nrows(), given.ncols()),
                     };
                     return Err(Error::input(
                         "guess: controls",

@@ -352,9 +352,9 @@ impl Objective for ProblemObjective {
         if sizes != self.0.cost.sizes || rollout.steps() != self.0.steps() {
             return Err(Error::input(
                 "objective of a problem: rollout",
-                format!("{} steps of {sizes:?}", rollout.steps()),
+                format!("{} steps of {sizes}", rollout.steps()),
                 format!(
-                    "must have {} steps of {:?}",
+                    "must have {} steps of {}",
                     self.0.steps(),
                     self.0.cost.sizes
                 ),

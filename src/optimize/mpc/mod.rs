@@ -88,8 +88,8 @@ fn check_plant(plant: Sizes, model: Sizes) -> Result<()> {
         true => Ok(()),
         false => Err(Error::input(
             "mpc: plant",
-            format!("{plant:?}"),
-            format!("must have the model's numbers: {model:?}"),
+            plant,
+            format!("must have the model's {model}"),
         )),
     }
 }
@@ -154,13 +154,14 @@ impl Mpc {
         let of =
             |ready: &Ready, model: &Simulator| (ready.cost.sizes, ready.steps(), model.time_step());
         let (theirs, ours) = (of(&ready, model), of(&self.ready, &self.model));
+        let told = |(sizes, steps, dt): &(Sizes, usize, f64)| {
+            format!("{sizes}, {steps} steps of a plan of {dt} s each")
+        };
         if theirs != ours {
             return Err(Error::input(
                 "mpc: model",
-                format!("{theirs:?}"),
-                format!(
-                    "must have the sizes, the steps of a plan and the time step of the one before: {ours:?}"
-                ),
+                told(&theirs),
+                format!("must be as the one before: {}", told(&ours)),
             ));
         }
         self.previous = ready.previous.clone();

@@ -49,6 +49,10 @@ pub enum Force {
     Current(Current),
 }
 
+/// Why there is no float in water with a surface.
+pub(crate) const BUOYANT_ANYWHERE: &str =
+    "a float is buoyant at any height: in water with a `waterline` give a body a shape instead";
+
 /// The forces of a kind, each with its number among all.
 macro_rules! kinds {
     ($($name:ident: $kind:ident),*) => {
@@ -141,7 +145,7 @@ impl Scene {
                     return Err(Error::input(
                         place("volume"),
                         float.volume,
-                        "a float is buoyant at any height: in water with a `waterline` give a body a shape instead",
+                        BUOYANT_ANYWHERE,
                     ));
                 }
                 Force::Float(float) => float.check(self, &place)?,

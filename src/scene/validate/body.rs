@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix6;
 
-use super::{bounded, finite, limits, list, mimic, passive, place, servo};
+use super::{bounded, finite, limits, list, mimic, passive, place, rotation, servo};
 use crate::geometry::impossible_inertia;
 use crate::scene::{Body, Carriers, Motion, Scene, Shape};
 use crate::{Error, Result};
@@ -14,7 +14,7 @@ pub(super) fn check(scene: &Scene, carriers: &Carriers, index: usize) -> Result<
             &place(body, &format!("{field}.position")),
             &placement.position,
         )?;
-        finite(
+        rotation(
             &place(body, &format!("{field}.rotation")),
             &placement.rotation,
         )?;
@@ -105,7 +105,7 @@ fn check_collision(body: &Body) -> Result<()> {
         let field = format!("collision[{k}]");
         let at = |name: &str| place(body, &format!("{field}.at.{name}"));
         finite(&at("position"), &piece.at.position)?;
-        finite(&at("rotation"), &piece.at.rotation)?;
+        rotation(&at("rotation"), &piece.at.rotation)?;
         check_surface(body, &piece.shape, &format!("{field}.shape"))?;
     }
     Ok(())

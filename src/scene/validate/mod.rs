@@ -245,6 +245,22 @@ pub(super) fn finite(place: &str, values: &[f64]) -> Result<()> {
     }
 }
 
+/// Angle, rad, beyond which a rotation vector is taken for a mistake: from there on its digits say little of the rotation, and its square may have no number.
+const MOST_TURNED: f64 = 1e6;
+
+/// Refuses what is no rotation vector.
+pub(super) fn rotation(place: &str, vector: &[f64; 3]) -> Result<()> {
+    finite(place, vector)?;
+    match norm(*vector) <= MOST_TURNED {
+        true => Ok(()),
+        false => Err(Error::input(
+            place,
+            list(vector),
+            "give the axis times the angle, rad, at most 1e6: a turn is 2π",
+        )),
+    }
+}
+
 /// Refuses what isn't finite, or is negative, or zero if it may not be.
 fn bounded(place: &str, value: f64, zero: bool, remedy: &str) -> Result<()> {
     finite(place, &[value])?;

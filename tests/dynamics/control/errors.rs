@@ -137,7 +137,7 @@ fn problems_that_cannot_be() {
         &sim,
         &problem,
         Guess::Controls(&DMatrix::zeros(8, 4)),
-        &["guess", "8 × 5"],
+        &["guess", "8 × 4", "8 × 5"],
     );
     let bad = DMatrix::from_element(8, 5, f64::NAN);
     refused(&sim, &problem, Guess::Controls(&bad), &["guess", "finite"]);
@@ -233,7 +233,12 @@ fn settings_that_cannot_be() {
     let run = mpc.run(&other, &at, 3, &problem.cost, |_| ControlFlow::Continue(()));
     says(
         run.err().expect("an error"),
-        &["mpc: plant", "controls: 6", "controls: 8"],
+        &["mpc: plant", "and 6 controls", "and 8 controls"],
+    );
+    let longer = Problem::new(7, problem.cost.clone());
+    says(
+        mpc.set_model(&sim, &longer).unwrap_err(),
+        &["mpc: model", "7 steps of a plan", "5 steps of a plan"],
     );
 }
 
@@ -273,6 +278,7 @@ fn feedback_of_other_sizes() {
     let seen = Observation {
         step: 0,
         time: 0.0,
+        time_step: 0.01,
         q,
         v,
         mode: 0,

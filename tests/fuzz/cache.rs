@@ -40,7 +40,7 @@ fn cached_bodies_hold() {
     let file = cache::path(folder.path(), key);
     cache::fetch(key, Some(folder.path()), || Ok(body.clone())).unwrap();
     let whole = std::fs::read(&file).unwrap();
-    fuzz("cache", vec![whole], 10_000, |input| {
+    fuzz("cache", vec![whole], 5_000, |input| {
         cache::forget();
         std::fs::write(&file, input).unwrap();
         match cache::fetch(key, Some(folder.path()), unmade) {
@@ -58,7 +58,7 @@ fn crafted_bodies_hold() {
     fuzz(
         "crafted",
         vec![text],
-        20_000,
+        10_000,
         |input| match serde_json::from_slice::<ReducedBody>(input) {
             Ok(found) => {
                 let larger = found.scaled(2.0);

@@ -48,7 +48,7 @@ fn read(path: &Path, input: &[u8]) -> Answer {
 fn hold(target: &'static str, extension: &str) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("mesh.{extension}"));
-    fuzz(target, corpus(extension), 20_000, |input| {
+    fuzz(target, corpus(extension), 10_000, |input| {
         read(&path, input)
     });
 }

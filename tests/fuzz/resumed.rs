@@ -40,7 +40,7 @@ fn trajectories_hold() {
                 .iter()
                 .all(|o| o.values.len() == recording.time.len()))
     };
-    fuzz("trajectory", vec![whole], 8_000, |input| {
+    fuzz("trajectory", vec![whole], 4_000, |input| {
         match go_on(input) {
             Ok(true) => Answer::Taken(String::new()),
             Ok(false) => {

@@ -61,7 +61,7 @@ fn robots_hold() {
         package_path: vec![root().join("tests/fuzz/corpus")],
         ..Robot::default().mimic(Followers::Independent)
     };
-    fuzz("robots", corpus("robot"), 500, |input| {
+    fuzz("robots", corpus("robot"), 300, |input| {
         made(&path, input, &options)
     });
 }

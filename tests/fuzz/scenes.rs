@@ -45,7 +45,7 @@ fn written_and_read(input: &[u8]) -> Answer {
 
 #[test]
 fn scene_files_hold() {
-    fuzz("scene", scenes(), 40_000, written_and_read);
+    fuzz("scene", scenes(), 20_000, written_and_read);
 }
 
 /// The scene with few faces, or none where that can't be.
@@ -123,5 +123,5 @@ fn run(scene: &Scene, settings: Settings) -> hydrograd::Result<Option<String>> {
 
 #[test]
 fn runs_of_scenes_hold() {
-    fuzz("run", scenes(), 500, simulated);
+    fuzz("run", scenes(), 250, simulated);
 }

@@ -33,5 +33,5 @@ fn shapes_in_a_word_hold() {
         "capsule:0.1,1e6",
     ];
     let corpus = corpus.map(|text| text.as_bytes().to_vec()).to_vec();
-    fuzz("shape", corpus, 5_000, built);
+    fuzz("shape", corpus, 2_500, built);
 }

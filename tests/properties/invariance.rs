@@ -36,7 +36,7 @@ fn mirrored(scene: &Scene, flip: bool) -> Scene {
 }
 
 proptest! {
-    #![proptest_config(few(10))]
+    #![proptest_config(few(7))]
 
     /// What happens in a current is what happens in still water, seen in passing: up to rounding.
     #[test]

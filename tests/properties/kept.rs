@@ -6,7 +6,7 @@ use hydrograd::dynamics::Integrator;
 use proptest::prelude::*;
 
 proptest! {
-    #![proptest_config(few(12))]
+    #![proptest_config(few(8))]
 
     /// By symmetry of the discrete equations: to rounding, with every integrator that steps in momentum.
     #[test]

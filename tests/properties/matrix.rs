@@ -31,7 +31,7 @@ fn scaled(m: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 proptest! {
-    #![proptest_config(few(24))]
+    #![proptest_config(few(14))]
 
     /// Reciprocity holds to rounding: what is solved for is symmetrised. No motion of rigid bodies takes energy from water at rest.
     #[test]

@@ -243,7 +243,7 @@ fn wide(scene: &Scene, given: &Contact, model: &ContactModel) -> Option<String> 
 fn contact_shape(body: &Body, shape: &Shape, surface: &Surface) -> Result<ContactShape> {
     let made = match shape {
         // Already placed in its body.
-        mesh if mesh.is_mesh() => ContactShape::of_mesh(&surface.mesh, Pose::identity()),
+        mesh if mesh.is_mesh() => ContactShape::of_mesh(surface.given(), Pose::identity()),
         _ => ContactShape::of_shape(shape, pose(&body.shape_at), Path::new("")),
     };
     made.map_err(|e| Error::Unsupported {

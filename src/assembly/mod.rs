@@ -54,7 +54,7 @@ impl Assembled {
         if let Some(found) = self.surfaces.get() {
             return Ok(found);
         }
-        let made = water::surfaces(scene, &choices.water)?;
+        let made = water::surfaces(scene, &choices.water, &choices.shape_parameters)?;
         Ok(self.surfaces.get_or_init(|| made))
     }
 
@@ -127,7 +127,7 @@ pub(crate) fn assemble(
         )),
         "use fewer bodies, or several scenes where they don't feel each other",
     )?;
-    let surfaces = water::surfaces(scene, &choices.water)?;
+    let surfaces = water::surfaces(scene, &choices.water, &choices.shape_parameters)?;
     let in_water = water::in_water(scene, &surfaces, &tree, choices.water.fidelity.coupled());
     let mut bodies = Vec::with_capacity(scene.bodies.len());
     let mut faces = Vec::with_capacity(scene.bodies.len());
@@ -164,7 +164,7 @@ pub(crate) fn assemble(
     let hulls: Vec<Option<Hull>> = match scene.waterline {
         Some(_) => (surfaces.iter().zip(&values))
             .map(|(s, values)| match s {
-                Some(s) => Ok(Some(hull(&s.mesh))),
+                Some(s) => Ok(Some(hull(s.given()))),
                 None => ball(values),
             })
             .collect::<Result<_>>()?,
@@ -249,6 +249,10 @@ pub(crate) fn assemble(
     #[cfg(feature = "urdf")]
     if scene.fluid.density > 0.0 {
         water.warnings.extend(scene.imports.warnings());
+    }
+    if scene.fluid.density > 0.0 {
+        let told = water::too_coarse(scene, &choices.water, &water.bodies, &surfaces);
+        water.warnings.extend(told);
     }
     system.coupling = water.coupling.clone();
     water.reasons.extend(contact::stand_in(scene, choices));

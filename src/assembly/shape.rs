@@ -78,13 +78,14 @@ pub(super) fn changed_surfaces<'a>(
     surfaces: &'a [Option<Surface>],
 ) -> Vec<ChangedSurface<'a>> {
     let changed = |(change, parameter): (&'a ShapeChange, &Parameter)| {
-        let mesh = &surfaces[change.body].as_ref()?.mesh;
+        let surface = surfaces[change.body].as_ref()?;
+        let (mesh, given) = (&surface.mesh, surface.given());
         Some(ChangedSurface {
             body: change.body,
             parameter: *parameter,
             step: STEP * change.size,
             surface: Box::new(move |t| elements(&change.moved(mesh, t))),
-            hull: Box::new(move |t| hull(&change.moved(mesh, t))),
+            hull: Box::new(move |t| hull(&change.moved(given, t))),
         })
     };
     changes
@@ -118,7 +119,7 @@ pub(super) fn changed_contacts(
                 Some(shape) if !shape.is_mesh() => {
                     ContactShape::of_shape(&shape, pose(&body.shape_at), Path::new(""))
                 }
-                _ => ContactShape::of_mesh(&change.moved(&surface.mesh, t), Pose::identity()),
+                _ => ContactShape::of_mesh(&change.moved(surface.given(), t), Pose::identity()),
             };
             let shape = shape.map_err(|e| Error::Unsupported {
                 what: format!(

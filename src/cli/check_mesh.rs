@@ -57,11 +57,16 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
             })
         }
     };
+    let water = match error {
+        None => report::Divided::of(&mesh.clone().into_mesh()?),
+        Some(_) => None,
+    };
     output.result(&report::MeshFileReport {
         ok: error.is_none(),
         error: error.as_ref().map(ToString::to_string),
         repairs: mesh.repairs,
         hull,
+        water,
         mesh: report,
     });
     let Some(error) = error else {
@@ -93,8 +98,9 @@ mod report {
 
     use serde::Serialize;
 
-    use crate::geometry::MeshReport;
+    use crate::geometry::{MeshReport, TriMesh};
     use crate::shape::file::Repairs;
+    use crate::shape::{DEFAULT_FACES, Edges, divide};
 
     /// What was found in a mesh file.
     #[derive(Debug, Serialize)]
@@ -109,6 +115,9 @@ mod report {
         /// The hull that was written.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub hull: Option<HullReport>,
+        /// What the water makes of its faces, where these are too long for it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub water: Option<Divided>,
         #[serde(flatten)]
         pub mesh: MeshReport,
     }
@@ -120,6 +129,55 @@ mod report {
         pub faces: usize,
         /// m³.
         pub volume: f64,
+    }
+
+    /// What the water makes of a mesh with long faces.
+    #[derive(Debug, Serialize)]
+    pub struct Divided {
+        /// Faces after dividing.
+        pub faces: usize,
+        /// The longest edge as given, m.
+        pub longest_edge: f64,
+        /// The longest edge after dividing, m.
+        pub divided_edge: f64,
+        /// The longest edge of as many even faces as shapes by formula have, m.
+        pub asked_edge: f64,
+        /// Whether edges are still far too long.
+        pub coarse: bool,
+    }
+
+    impl Divided {
+        /// None of a mesh that stays as it is.
+        pub fn of(mesh: &TriMesh) -> Option<Self> {
+            let divided = divide(mesh, DEFAULT_FACES)?;
+            let after = Edges::of(&divided, DEFAULT_FACES);
+            Some(Self {
+                faces: divided.faces().len(),
+                longest_edge: Edges::of(mesh, DEFAULT_FACES).longest,
+                divided_edge: after.longest,
+                asked_edge: after.asked,
+                coarse: after.are_long(),
+            })
+        }
+    }
+
+    impl fmt::Display for Divided {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(
+                f,
+                "\n  edges are as long as {:.3e} m: the water sees {} faces with edges of up to {:.3e} m, into which they are divided",
+                self.longest_edge, self.faces, self.divided_edge
+            )?;
+            match self.coarse {
+                false => Ok(()),
+                true => write!(
+                    f,
+                    "\n  warning: {DEFAULT_FACES} even faces would have no edge over {:.3e} m\n    \
+                     what the water does to it may be far off: remesh it with shorter, more even faces",
+                    self.asked_edge
+                ),
+            }
+        }
     }
 
     impl fmt::Display for MeshFileReport {
@@ -139,6 +197,9 @@ mod report {
             mended(merged_same, "vertices merged with one at the same place")?;
             mended(merged_near, "vertices merged with one very near")?;
             mended(collapsed, "faces without area left out after merging")?;
+            if let Some(water) = &self.water {
+                write!(f, "{water}")?;
+            }
             match &self.hull {
                 None => Ok(()),
                 Some(hull) => write!(

@@ -66,5 +66,6 @@ pub(crate) use opposite::Opposite;
 pub use pairing::Pairing;
 pub use points::Ball;
 pub(crate) use points::bounds;
+pub(crate) use refine::divided;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};
 pub use wall::{HalfSpace, Wall, WallSurface};

@@ -5,6 +5,7 @@
 
 mod build;
 mod description;
+mod divide;
 #[cfg(feature = "meshio")]
 pub mod file;
 mod mass;
@@ -21,6 +22,7 @@ pub use crate::geometry::{
 };
 pub use build::build;
 pub use description::{DEFAULT_FACES, MAX_FACES, Shape};
+pub(crate) use divide::{Edges, divide};
 pub use refine::refine;
 pub use solid::solid;
 pub use text::{parse_shape, shape_name};

@@ -362,6 +362,7 @@ impl Simulator {
             tree,
             poses: &tree.kinematics(&self.assembled.q).poses,
             water: &self.assembled.water,
+            shape_parameters: &self.choices.shape_parameters,
         };
         subject.error_estimate()
     }

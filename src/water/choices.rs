@@ -4,6 +4,7 @@ use super::backend::{Backend, GpuSettings};
 use super::fidelity::Fidelity;
 use super::method::Method;
 use super::numerics::Numerics;
+use super::shape::vertices_are_asked_for;
 use super::surface::{Meshing, Surface, surface};
 use crate::Result;
 use crate::boundary::{self, Depth};
@@ -21,7 +22,8 @@ pub struct WaterChoices {
     pub method: Method,
     /// The numbers that both work with.
     pub numerics: Numerics,
-    /// Faces per body of shapes by formula; `None`: what each shape says.
+    /// Faces per body of shapes by formula; `None`: what each shape says. A mesh is divided where its edges are far longer than those of
+    /// so many faces (`None`: 1280).
     pub faces: Option<usize>,
     /// What computes the coupling.
     pub backend: Backend,
@@ -62,6 +64,7 @@ impl WaterChoices {
         let (alone, method) = (self.fidelity.kind().solves_alone(), self.method.kind());
         Meshing {
             faces: self.faces,
+            keeps: false,
             by_formula: alone && method.by_formula(),
             pairs: self.method_used().kind().extrapolates(),
         }
@@ -176,22 +179,32 @@ fn without_effect(name: &str, with: &str, who: &str) -> String {
 }
 
 /// The surfaces of all bodies of a scene, each in its body's frame; none for a body without a shape. Equal shapes are meshed once.
+/// Meshes whose vertices are among the `shape_parameters` keep their faces.
 ///
 /// # Errors
 /// A mesh that can't be read, or a shape that can't be meshed.
-pub(crate) fn surfaces(scene: &Scene, choices: &WaterChoices) -> Result<Vec<Option<Surface>>> {
-    let meshing = choices.meshing();
+pub(crate) fn surfaces(
+    scene: &Scene,
+    choices: &WaterChoices,
+    shape_parameters: &[String],
+) -> Result<Vec<Option<Surface>>> {
+    let keeps = |body: &Body| vertices_are_asked_for(body, shape_parameters);
     let mut out: Vec<Option<Surface>> = Vec::with_capacity(scene.bodies.len());
     // The first bodies of each shape.
     let mut firsts: Vec<usize> = Vec::new();
     for (b, body) in scene.bodies.iter().enumerate() {
         let known = firsts
             .iter()
-            .find(|a| is_shaped_as(&scene.bodies[**a], body));
+            .map(|a| (*a, &scene.bodies[*a]))
+            .find(|(_, first)| is_shaped_as(first, body) && keeps(first) == keeps(body));
         let made = match known {
-            Some(a) => out[*a].clone(),
+            Some((a, _)) => out[a].clone(),
             None => {
                 firsts.push(b);
+                let meshing = Meshing {
+                    keeps: keeps(body),
+                    ..choices.meshing()
+                };
                 surface(body, meshing, 1.0)?
             }
         };

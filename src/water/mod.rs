@@ -55,6 +55,7 @@ mod resolved;
 mod shape;
 mod submerged;
 mod surface;
+mod too_coarse;
 
 pub use backend::{AdapterName, Arithmetic, Backend, BackendReport, DeviceReport, GpuSettings};
 pub use choices::WaterChoices;
@@ -74,3 +75,4 @@ pub(crate) use prepared::{Prepared, own_added_mass, prepare, world_axes};
 pub(crate) use shape::ShapeChange;
 pub(crate) use submerged::in_water;
 pub(crate) use surface::{Surface, pose};
+pub(crate) use too_coarse::too_coarse;

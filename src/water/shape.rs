@@ -4,7 +4,7 @@ use super::submerged::SubmergedBody;
 use super::surface::{Coarse, Surface, pose, semi_axes};
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::geometry::{MassProperties, TriMesh};
-use crate::scene::{Scene, Shape};
+use crate::scene::{Body, Scene, Shape};
 use crate::{Error, Result};
 
 /// All shapes.
@@ -250,6 +250,16 @@ impl Changed<'_> {
             regions: self.body.regions.clone(),
         }
     }
+}
+
+/// Whether vertices of a body's mesh are among what `wanted` asks for.
+pub(super) fn vertices_are_asked_for(body: &Body, wanted: &[String]) -> bool {
+    let vertices = |pattern: &String| {
+        let own = pattern.strip_prefix(body.name.as_str())?;
+        let rest = own.strip_prefix('.')?.strip_prefix(VERTEX)?;
+        Some(rest.is_empty() || rest.starts_with('.'))
+    };
+    wanted.iter().any(|pattern| vertices(pattern) == Some(true))
 }
 
 /// The number that each of the `count` vertices of a shape's mesh has in the shape as given, by which [`Scene::with_shape_parameter`] sets it: the mesh leaves out vertices that no face uses.

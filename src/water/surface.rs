@@ -16,6 +16,8 @@ pub(crate) fn pose(p: &Placement) -> Pose {
 #[derive(Clone)]
 pub(crate) struct Surface {
     pub mesh: TriMesh,
+    /// The mesh that was given, where its faces were divided for the water.
+    given: Option<TriMesh>,
     /// Its faces before regions of it were refined.
     pub base: usize,
     /// A mesh of about a quarter of the faces, of a shape by formula.
@@ -42,6 +44,11 @@ impl Surface {
         (4.0 / 3.0_f64.sqrt() * self.mesh.surface_area() / self.base as f64).sqrt()
     }
 
+    /// With its faces as they were given, where it was: for what doesn't depend on how it is divided.
+    pub fn given(&self) -> &TriMesh {
+        self.given.as_ref().unwrap_or(&self.mesh)
+    }
+
     /// Of a mesh alone.
     pub fn of_mesh(mesh: TriMesh) -> Self {
         Self {
@@ -50,6 +57,7 @@ impl Surface {
             base: mesh.faces().len(),
             coarse: None,
             solid: None,
+            given: None,
             mesh,
         }
     }
@@ -58,8 +66,10 @@ impl Surface {
 /// What the water asks of surfaces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meshing {
-    /// Target number of faces of shapes by formula; `None`: the shape's own.
+    /// Target number of faces of shapes by formula; `None`: the shape's own. Longer faces of meshes are divided.
     pub faces: Option<usize>,
+    /// Whether meshes keep their faces whatever their length.
+    pub keeps: bool,
     /// Whether ellipsoids are solved by formula.
     pub by_formula: bool,
     /// Whether shapes by formula get a second, coarser mesh.
@@ -100,7 +110,13 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
         let place = format!("body {:?}", body.name);
         Ok(shape::refine(base, shape, &regions, &place)?.transformed(&at))
     };
-    let mesh = even(meshing.faces)?;
+    let own = even(meshing.faces)?;
+    let divided = match shape.is_mesh() && !meshing.keeps {
+        true => shape::divide(&own, meshing.faces.unwrap_or(shape::DEFAULT_FACES)),
+        false => None,
+    };
+    let given = divided.as_ref().map(|_| own.transformed(&at));
+    let mesh = divided.unwrap_or(own);
     let base = mesh.faces().len();
     let mesh = refined(&mesh, edges)?;
     let closed = meshing.by_formula && semi_axes(shape).is_some();
@@ -125,11 +141,13 @@ pub(crate) fn surface(body: &Body, meshing: Meshing, edges: f64) -> Result<Optio
         false => None,
     };
     let by_formula = formula.is_some();
-    let properties = formula.map_or_else(|| mesh.mass_properties(), |p| p.transformed(&at));
+    let solid_mesh = given.as_ref().unwrap_or(&mesh);
+    let properties = formula.map_or_else(|| solid_mesh.mass_properties(), |p| p.transformed(&at));
     Ok(Some(Surface {
         properties,
         by_formula,
         mesh,
+        given,
         base,
         coarse,
         solid: shape::solid(shape, at)?,

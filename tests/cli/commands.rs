@@ -157,6 +157,14 @@ fn good_mesh_passes_the_check() {
     );
     let volume = value["volume"].as_f64().unwrap();
     assert!((volume - 1e-3 / 6.0).abs() < 1e-15);
+    // Four faces are few for the water.
+    assert!(text(&plain.stdout).contains("into which they are divided"));
+    let water = &value["water"];
+    assert!(water["faces"].as_u64().unwrap() > 500);
+    assert_eq!(water["coarse"].as_bool(), Some(false));
+    let edge = |name: &str| water[name].as_f64().unwrap();
+    assert!(edge("divided_edge") <= edge("asked_edge"));
+    assert!((edge("longest_edge") - 0.1 * 2.0_f64.sqrt()).abs() < 1e-12);
 }
 
 #[test]

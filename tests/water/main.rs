@@ -12,6 +12,7 @@ mod gap_check;
 mod gap_error;
 mod given;
 mod lines;
+mod long_faces;
 mod methods;
 mod near;
 mod one_body;

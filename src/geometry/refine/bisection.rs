@@ -16,6 +16,9 @@ use crate::geometry::mesh::TriMesh;
 use hydrograd_adjoint::lie::Vec3;
 use std::collections::HashMap;
 
+/// Mean area of faces over the longest edge asked for squared, as found with bodies of all kinds.
+pub(super) const MEAN_AREA: f64 = 0.18;
+
 /// An edge with its length, ordered by it. Equal lengths are told apart by the vertices: a strict order, or
 /// paths of ever longer edges might run in circles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,7 +43,7 @@ pub(super) struct Bisection {
     curved: Vec<bool>,
     exact: ExactSurface,
     /// The two faces of each edge, which is known by its vertices, the smaller number first.
-    sides: HashMap<[usize; 2], [usize; 2]>,
+    pub sides: HashMap<[usize; 2], [usize; 2]>,
 }
 
 impl Bisection {
@@ -96,7 +99,7 @@ impl Bisection {
     }
 
     /// Splits an edge and its two faces.
-    fn split(&mut self, ends: [usize; 2], faces: [usize; 2]) -> [usize; 4] {
+    pub fn split(&mut self, ends: [usize; 2], faces: [usize; 2]) -> [usize; 4] {
         let [a, b] = ends.map(|v| self.vertices[v]);
         let mut middle = a + (b - a) * 0.5;
         if faces.iter().any(|f| self.curved[*f]) {

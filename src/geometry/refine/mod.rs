@@ -1,18 +1,22 @@
 //! Finer faces where a body comes near others.
 //!
 //! Faces that touch a region (a ball) are split at their longest edges until these are short enough; around
-//! it the mesh grows coarser from ring to ring. See [`bisection`] for how, and [`ExactSurface`] for curved parts.
+//! it the mesh grows coarser from ring to ring. See [`bisection`] for how, and [`ExactSurface`] for curved parts. Meshes
+//! whose faces are too long for what they should resolve are divided everywhere ([`divide`]).
 
 mod bisection;
+mod divide;
 mod exact;
+mod flip;
 
+pub(crate) use divide::divided;
 pub use exact::ExactSurface;
 
 use crate::error::{Error, Result};
 use crate::geometry::mesh::TriMesh;
 use crate::geometry::points::area_vector;
 use crate::geometry::triangle::Triangle;
-use bisection::{Bisection, EdgeLength};
+use bisection::{Bisection, EdgeLength, MEAN_AREA};
 use hydrograd_adjoint::lie::Vec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BinaryHeap;
@@ -36,8 +40,6 @@ pub struct Refinement {
 pub const MAX_ADDED_FACES: usize = 200_000;
 /// Shortest edge that may be asked for, over the diameter of the mesh: far below it rounding would fold faces.
 const SHORTEST: f64 = 1e-6;
-/// Mean area of faces in a region over its edge squared, as found with bodies of all kinds.
-const MEAN_AREA: f64 = 0.18;
 
 /// Whether the numbers of regions can be. `place` begins the message: the body's name.
 ///

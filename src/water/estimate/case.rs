@@ -38,6 +38,8 @@ pub(crate) struct Subject<'a> {
     /// Poses of all bodies of the scene.
     pub poses: &'a [Pose],
     pub water: &'a Prepared,
+    /// Names of the shape parameters.
+    pub shape_parameters: &'a [String],
 }
 
 /// What the estimate is of.
@@ -81,11 +83,12 @@ impl<'a> Case<'a> {
             scene,
             choices,
             water,
+            shape_parameters,
             ..
         } = subject;
         let bodies = water.bodies.as_slice();
         let poses: Vec<Pose> = bodies.iter().map(|b| subject.poses[*b]).collect();
-        let surfaces = surfaces(scene, choices)?;
+        let surfaces = surfaces(scene, choices, shape_parameters)?;
         let turn = world_axes(&poses);
         let (matrix, report) = evaluate(water.coupling.as_ref(), &poses, &turn)?;
         let films = water.coupling.film_momenta(&poses, &turn)?;
@@ -274,6 +277,7 @@ impl<'a> Case<'a> {
                     });
                     let meshing = Meshing {
                         faces: Some(base),
+                        keeps: true,
                         by_formula: false,
                         pairs: false,
                     };

@@ -249,7 +249,7 @@ pub(crate) fn assemble(
     #[cfg(feature = "urdf")]
     if scene.fluid.density > 0.0 {
         water.warnings.extend(scene.imports.warnings());
-        let told = water::too_coarse(scene, &choices.water, &water.bodies, &surfaces);
+        let told = water::too_coarse(scene, choices.water.faces, &water.bodies, &surfaces);
         water.warnings.extend(told);
     }
     system.coupling = water.coupling.clone();

@@ -1,6 +1,5 @@
 //! Bodies whose faces are too few or too long for what is asked of them.
 
-use super::choices::WaterChoices;
 use super::surface::Surface;
 use crate::geometry::MassProperties;
 use crate::scene::{Body, Scene};
@@ -9,14 +8,14 @@ use crate::shape::{DEFAULT_FACES, Edges};
 /// Part of a shape's volume that its faces may lose without a word.
 const LOST: f64 = 0.1;
 
-/// What is said of the bodies in the water, of which each kind is told of the worst.
+/// What is said of the bodies in the water where so many `faces` are asked for, the worst of each kind.
 pub(crate) fn too_coarse(
     scene: &Scene,
-    choices: &WaterChoices,
+    faces: Option<usize>,
     in_water: &[usize],
     surfaces: &[Option<Surface>],
 ) -> Vec<String> {
-    let faces = choices.faces.unwrap_or(DEFAULT_FACES);
+    let faces = faces.unwrap_or(DEFAULT_FACES);
     let seen = |b: &usize| Some((&scene.bodies[*b], surfaces[*b].as_ref()?));
     let bodies: Vec<(&Body, &Surface)> = in_water.iter().filter_map(seen).collect();
     let long = bodies.iter().filter_map(|(body, surface)| {

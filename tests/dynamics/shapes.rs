@@ -70,8 +70,10 @@ fn worst(scene: &Scene, settings: &Settings, part: f64) -> f64 {
     let size = rollout.value(&goal).unwrap();
     let gradient = rollout.gradient(&goal).unwrap();
     let mut found = Vec::new();
+    // A mesh whose vertices are asked for keeps its long faces.
+    let asked = settings.shape_parameters.clone();
     let plain = Settings {
-        shape_parameters: None,
+        shape_parameters: asked.filter(|names| names.iter().any(|n| n.ends_with(".vertex"))),
         ..settings.clone()
     };
     let names = gradient.parameters.names();

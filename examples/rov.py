@@ -108,8 +108,8 @@ def scene_of(current, drag):
 
 
 def simulator(current, step, drag, cache):
-    """The scene made ready, with few points a body; their setup is kept in a folder."""
-    return hg.Simulator(scene_of(current, drag), step, fidelity="reduced", rank=20, cache=cache)
+    """The scene made ready, with few points a body; their setup is kept in a folder. The PIDs' gains were tuned with this integrator."""
+    return hg.Simulator(scene_of(current, drag), step, fidelity="reduced", rank=20, cache=cache, integrator="momentum-euler")
 
 
 class Robot:

@@ -249,6 +249,8 @@ pub(crate) fn assemble(
     #[cfg(feature = "urdf")]
     if scene.fluid.density > 0.0 {
         water.warnings.extend(scene.imports.warnings());
+    }
+    if scene.fluid.density > 0.0 {
         let told = water::too_coarse(scene, choices.water.faces, &water.bodies, &surfaces);
         water.warnings.extend(told);
     }

@@ -19,6 +19,7 @@ use nalgebra::DVector;
 const ROUNDING: f64 = 1e-6;
 
 /// How many time steps (s) a clock has made that started a time (s) ago, a whole number; negative before it starts.
+#[cfg(feature = "opt")]
 pub(crate) fn steps_at(time: f64, time_step: f64) -> f64 {
     (time / time_step + ROUNDING).floor()
 }

@@ -1,7 +1,7 @@
 //! Bodies and their drag.
 
 use crate::array::{self, Dim, fixed, or_zeros, row};
-use crate::error::input;
+use crate::error::{input, shown};
 use crate::joint::{Joint, Motion};
 use crate::shape::Shape;
 use hydrograd::scene::{self, CollisionPiece, DragPart, Placement, Refinement};
@@ -150,7 +150,6 @@ where
     let Some(given) = given else {
         return Ok(Vec::new());
     };
-    let shown = |x: &Bound<'py, PyAny>| x.repr().map(|r| r.to_string()).unwrap_or_default();
     let each = |(k, item): (usize, PyResult<Bound<'py, PyAny>>)| {
         let item = item?;
         let refuse = |_| input(format!("{place}[{k}]"), shown(&item), expected);
@@ -280,9 +279,8 @@ impl Body {
         };
         let parent = parent.map(|given| {
             given.extract().map_err(|_: PyErr| {
-                let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
                 let expected = "must be the name of a body, or its number, counted from 0";
-                input(at("parent"), shown, expected)
+                input(at("parent"), shown(given), expected)
             })
         });
         let (number, parent) = match parent.transpose()? {

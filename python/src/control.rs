@@ -2,7 +2,7 @@
 
 use crate::array::{self, Dim, array};
 use crate::cost::CostTerm;
-use crate::error::{counts, input, internal};
+use crate::error::{counts, input, internal, shown};
 use crate::interrupt::{Interrupt, Progress, Told, followed, lock, long, short};
 use crate::optimize::class;
 use crate::rollout::Rollout;
@@ -41,13 +41,7 @@ fn limits(place: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
         return Ok(Vec::new());
     };
     let expected = "must be a number, or one for each control";
-    let refuse = |_| {
-        input(
-            place,
-            given.repr().map_or("?".into(), |r| r.to_string()),
-            expected,
-        )
-    };
+    let refuse = |_| input(place, shown(given), expected);
     match given.extract::<f64>() {
         Ok(all) => Ok(vec![all]),
         Err(_) => given.extract::<Vec<f64>>().map_err(refuse),

@@ -165,9 +165,14 @@ pub fn input(
     exception(hydrograd::Error::input(place, value, expected))
 }
 
+/// What was given, as Python writes it.
+pub fn shown(given: &Bound<'_, PyAny>) -> String {
+    given.repr().map_or("?".into(), |r| r.to_string())
+}
+
 /// Counts that are given by keyword: what can't be one is an `InputError` that names it.
 pub mod counts {
-    use super::input;
+    use super::{input, shown};
     use pyo3::prelude::*;
 
     fn count<'py, T: FromPyObjectOwned<'py>>(
@@ -175,8 +180,8 @@ pub mod counts {
         given: &Bound<'py, PyAny>,
     ) -> PyResult<T> {
         given.extract::<T>().map_err(|_| {
-            let shown = given.repr().map(|r| r.to_string()).unwrap_or_default();
-            input(keyword, shown, "must be a whole number that isn't negative")
+            let expected = "must be a whole number that isn't negative";
+            input(keyword, shown(given), expected)
         })
     }
 

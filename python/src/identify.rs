@@ -1,7 +1,7 @@
 //! Parameters from recordings.
 
 use crate::array::{self, Dim, array};
-use crate::error::{OrRaise, counts, input};
+use crate::error::{OrRaise, counts, input, shown};
 use crate::interrupt::{Told, long};
 use crate::mapping;
 use crate::nested::ask;
@@ -229,8 +229,11 @@ impl Experiment {
             return Ok((0..=self.steps).collect());
         };
         given.extract().map_err(|_| {
-            let said = given.repr().map_or("?".into(), |r| r.to_string());
-            input("experiment: states", said, "must be whole numbers from 0")
+            input(
+                "experiment: states",
+                shown(given),
+                "must be whole numbers from 0",
+            )
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Plane walls.
 
 use crate::error::{Error, Result};
-use hydrograd_adjoint::lie::Vec3;
+use hydrograd_adjoint::lie::{Vec3, unit};
 use serde::{Deserialize, Serialize};
 
 /// A plane that bounds the water.
@@ -82,12 +82,10 @@ impl HalfSpace {
     /// From a point of the plane (m) and a normal of any length; none unless both are finite and the normal
     /// isn't zero.
     pub fn new(point: &Vec3, normal: &Vec3) -> Option<Self> {
-        // Over its largest component first: its square may leave double precision.
-        let largest = normal.amax();
         let finite = normal.iter().chain(point.iter()).all(|x| x.is_finite());
-        (largest > 0.0 && finite).then(|| Self {
+        (normal.amax() > 0.0 && finite).then(|| Self {
             point: *point,
-            normal: (normal / largest).normalize(),
+            normal: unit(normal),
         })
     }
 

@@ -1,36 +1,17 @@
 //! Bodies at the surface of the water: displaced volume, stiffness, energy, drag, gradients.
 
+use crate::support::bodies::sided_cylinder;
 use crate::support::{check_gradient, says};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Drag, DragPart, Fin, Fluid, Force, Joint, Scene, Shape};
 use hydrograd::simulate::gradcheck::{GradcheckSettings, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use nalgebra::DVector;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 const GRAVITY: f64 = 9.81;
 const DENSITY: f64 = 998.0;
 const HEIGHT: f64 = 0.7;
-
-/// An upright prism of so many sides about a cylinder along z.
-fn prism(sides: usize, radius: f64, length: f64) -> Shape {
-    let ring = |z: f64| {
-        (0..sides).map(move |k| {
-            let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
-            [radius * cos, radius * sin, z]
-        })
-    };
-    let ends = [-0.5 * length, 0.5 * length];
-    let mut vertices: Vec<[f64; 3]> = ends.into_iter().flat_map(ring).collect();
-    vertices.extend(ends.map(|z| [0.0, 0.0, z]));
-    let faces = (0..sides).flat_map(|k| {
-        let (a, b) = (k, (k + 1) % sides);
-        let (c, d) = (sides + a, sides + b);
-        let [low, high] = [2 * sides, 2 * sides + 1];
-        [[a, b, d], [a, d, c], [low, b, a], [high, c, d]]
-    });
-    Shape::triangles(vertices, faces.collect::<Vec<_>>())
-}
 
 /// A body of half the water's density, its centre at the surface.
 fn floating(shape: Shape) -> Scene {
@@ -82,7 +63,7 @@ fn hydrostatic_stiffness_is_the_waterplanes() {
         ),
         (
             // A thousandth of the disc's area is missing from meshes of a cylinder with a thousand faces.
-            prism(4000, radius, length),
+            sided_cylinder(4000, radius, length),
             disc,
             [0.25 * disc * radius * radius; 2],
             length,

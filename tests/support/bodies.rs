@@ -16,6 +16,26 @@ pub fn mapped(mesh: &TriMesh, to: impl Fn(&Vec3) -> Vec3) -> TriMesh {
     TriMesh::new(mesh.name(), vertices, mesh.faces().to_vec()).unwrap()
 }
 
+/// A cylinder along z of so many flat sides, each of two triangles from end to end; the ends are fans.
+pub fn sided_cylinder(sides: usize, radius: f64, length: f64) -> Shape {
+    let ring = |z: f64| {
+        (0..sides).map(move |k| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / sides as f64).sin_cos();
+            [radius * cos, radius * sin, z]
+        })
+    };
+    let ends = [-0.5 * length, 0.5 * length];
+    let mut vertices: Vec<[f64; 3]> = ends.into_iter().flat_map(ring).collect();
+    vertices.extend(ends.map(|z| [0.0, 0.0, z]));
+    let faces = (0..sides).flat_map(|k| {
+        let (a, b) = (k, (k + 1) % sides);
+        let (c, d) = (sides + a, sides + b);
+        let [low, high] = [2 * sides, 2 * sides + 1];
+        [[a, b, d], [a, d, c], [low, b, a], [high, c, d]]
+    });
+    Shape::triangles(vertices, faces.collect::<Vec<_>>())
+}
+
 /// A box whose cells shrink towards the edges with the square of the distance, `cells` along each
 /// axis; diagonals mirror each other.
 pub fn graded_box(size: [f64; 3], cells: [usize; 3]) -> TriMesh {

@@ -1,10 +1,10 @@
 //! Meshes as CAD programs write them, with few long faces where a surface is flat or ruled.
 
+use crate::support::bodies::sided_cylinder;
 use hydrograd::adjoint::lie::Mat6;
 use hydrograd::scene::{Body, Fluid, Scene};
 use hydrograd::shape::{TriMesh, build};
 use hydrograd::{Fidelity, Settings, Shape, Simulator};
-use std::f64::consts::TAU;
 
 /// A box of twelve triangles.
 fn cuboid(size: [f64; 3]) -> Shape {
@@ -24,27 +24,6 @@ fn cuboid(size: [f64; 3]) -> Shape {
     let halves = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]];
     let vertices: Vec<[f64; 3]> = vertices.collect();
     Shape::triangles(vertices, sides.map(halves).concat())
-}
-
-/// A cylinder along z of so many sides, each of two triangles from end to end; the ends are fans.
-fn cylinder(sides: usize, radius: f64, length: f64) -> Shape {
-    let ring = |z: f64| {
-        (0..sides).map(move |k| {
-            let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
-            [radius * cos, radius * sin, z]
-        })
-    };
-    let ends = [-0.5 * length, 0.5 * length];
-    let mut vertices: Vec<[f64; 3]> = ends.into_iter().flat_map(ring).collect();
-    vertices.extend(ends.map(|z| [0.0, 0.0, z]));
-    let faces = (0..sides).flat_map(|k| {
-        let (a, b) = (k, (k + 1) % sides);
-        let (c, d) = (sides + a, sides + b);
-        let [low, high] = [2 * sides, 2 * sides + 1];
-        [[a, b, d], [a, d, c], [low, b, a], [high, c, d]]
-    });
-    let faces: Vec<[usize; 3]> = faces.collect();
-    Shape::triangles(vertices, faces)
 }
 
 fn as_triangles(shape: &Shape, faces: usize) -> (Shape, TriMesh) {
@@ -88,7 +67,7 @@ fn few_long_faces_have_the_added_mass_of_the_formula() {
     let tube = Shape::cylinder(radius, length);
     // Panels on meshes of even faces, as many, are off by as much: these have no second mesh to extrapolate from.
     for sides in [12, 24, 48] {
-        let error = off(&cylinder(sides, radius, length), &tube, &all[..5]);
+        let error = off(&sided_cylinder(sides, radius, length), &tube, &all[..5]);
         assert!(error < 0.06, "{sides} sides: {error}");
     }
     let size = [0.5, 0.3, 0.2];
@@ -102,7 +81,7 @@ fn few_long_faces_have_the_added_mass_of_the_formula() {
 /// The body stays what it was: mass, volume, and where it touches.
 #[test]
 fn dividing_faces_moves_no_surface() {
-    let shape = cylinder(24, 0.1, 0.6);
+    let shape = sided_cylinder(24, 0.1, 0.6);
     let given = build(&shape, "".as_ref(), None).unwrap();
     let simulator = simulator(&shape, isolated());
     let seen = simulator.meshes().unwrap().remove(0).unwrap();

@@ -14,7 +14,7 @@ mod twist;
 pub use pose::Pose;
 pub use rotation::{
     exp, exp_jacobian, exp_jacobian_inverse, exp_jacobian_inverse_jvp, exp_jacobian_inverse_vjp,
-    exp_matrix, skew, unskew,
+    exp_matrix, skew, unit, unskew,
 };
 pub use twist::{cross_force, cross_motion, point_velocity, point_wrench};
 

@@ -6,6 +6,11 @@
 use super::{Mat3, Vec3};
 use nalgebra::UnitQuaternion;
 
+/// The unit vector along a vector of any length that isn't zero: over its largest component first, as its square may leave double precision.
+pub fn unit(a: &Vec3) -> Vec3 {
+    (a / a.amax()).normalize()
+}
+
 /// Matrix of the cross product, `skew(a) b = a × b`.
 #[inline]
 pub fn skew(a: &Vec3) -> Mat3 {

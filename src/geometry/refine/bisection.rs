@@ -19,6 +19,11 @@ use std::collections::HashMap;
 /// Mean area of faces over the longest edge asked for squared, as found with bodies of all kinds.
 pub(super) const MEAN_AREA: f64 = 0.18;
 
+/// What an edge is known by: its vertices, the smaller number first.
+pub(super) fn key(a: usize, b: usize) -> [usize; 2] {
+    [a.min(b), a.max(b)]
+}
+
 /// An edge with its length, ordered by it. Equal lengths are told apart by the vertices: a strict order, or
 /// paths of ever longer edges might run in circles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,7 +47,7 @@ pub(super) struct Bisection {
     /// Whether each face stands for a curved part.
     curved: Vec<bool>,
     exact: ExactSurface,
-    /// The two faces of each edge, which is known by its vertices, the smaller number first.
+    /// The two faces of each edge, by its [`key`].
     pub sides: HashMap<[usize; 2], [usize; 2]>,
 }
 
@@ -51,7 +56,7 @@ impl Bisection {
     pub fn new(mesh: &TriMesh, exact: ExactSurface) -> Self {
         let sides = mesh.edges().into_iter().map(|e| {
             let [a, b] = e.vertices;
-            ([a.min(b), a.max(b)], e.faces)
+            (key(a, b), e.faces)
         });
         let all = 0..mesh.faces().len();
         Self {
@@ -78,7 +83,7 @@ impl Bisection {
             squared: (self.vertices[b] - self.vertices[a])
                 .norm_squared()
                 .to_bits(),
-            ends: [a.min(b), a.max(b)],
+            ends: key(a, b),
         };
         edge(a, b).max(edge(b, c)).max(edge(c, a))
     }
@@ -119,7 +124,7 @@ impl Bisection {
             // A triangle has a third corner.
             let apex = apex.unwrap_or(m);
             self.sides.insert([apex, m], [f, new]);
-            let outer = [apex.min(ends[1]), apex.max(ends[1])];
+            let outer = key(apex, ends[1]);
             if let Some(beside) = self.sides.get_mut(&outer) {
                 *beside = beside.map(|g| if g == f { new } else { g });
             }

@@ -3,9 +3,9 @@
 //! Edges are split in their middles, the longest first, and diagonals of flat parts are chosen anew after each ([`super::flip`]), so that long thin
 //! faces don't stay thin where the surface has room beside them.
 
-use super::bisection::{Bisection, MEAN_AREA};
+use super::bisection::{Bisection, MEAN_AREA, key};
 use super::exact::ExactSurface;
-use super::flip::{edges, key};
+use super::flip::edges;
 use crate::geometry::mesh::TriMesh;
 use std::collections::BinaryHeap;
 

@@ -6,18 +6,13 @@
 //! # References
 //! C. L. Lawson, "Software for C¹ surface interpolation", in Mathematical Software III, Academic Press 1977, 161–194.
 
-use super::bisection::Bisection;
+use super::bisection::{Bisection, key};
 use hydrograd_adjoint::lie::Vec3;
 
 /// How far out of their plane two faces may bend and be flat, over their longest edge: rounding of coordinates in single precision.
 const FLAT: f64 = 1e-6;
 /// Cotangents under whose sum an edge is flipped: corners on one circle leave a choice, which rounding shouldn't make.
 const OBTUSE: f64 = -1e-6;
-
-/// An edge's key: its vertices, the smaller number first.
-pub(super) fn key(a: usize, b: usize) -> [usize; 2] {
-    [a.min(b), a.max(b)]
-}
 
 /// The three edges of a face.
 pub(super) fn edges([a, b, c]: [usize; 3]) -> [[usize; 2]; 3] {

@@ -1,7 +1,7 @@
 //! Translation along an axis, rotation about it, and both at once on a screw thread.
 
 use super::{JointMotion, Refused};
-use crate::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, six};
+use crate::adjoint::lie::{Mat3, Pose, Vec3, Vec6, exp_matrix, six, unit};
 use std::f64::consts::TAU;
 
 #[derive(Debug)]
@@ -23,8 +23,7 @@ impl Axis {
     pub fn new(given: [f64; 3]) -> Self {
         Self {
             given,
-            // Scaled first: squares of lengths that their type allows may not be numbers.
-            unit: (Vec3::from(given) / Vec3::from(given).amax()).normalize(),
+            unit: unit(&Vec3::from(given)),
         }
     }
 }

@@ -85,6 +85,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
     ) -> Result<Found> {
         let mut at = self.evaluate(&self.misfit.start())?;
         let mut linear = self.misfit.linearise(&at)?;
+        let mut promised = self.step(&at.x, &linear, NO_DAMPING).expected;
         let (mut jacobians, mut iterations) = (1, 0);
         let (mut damping, mut growth, mut refused) = (self.settings.damping, 2.0, 0);
         let stop = loop {
@@ -95,13 +96,13 @@ impl<'m, 'a> Marquardt<'m, 'a> {
                 break IdentifyStop::Stuck;
             }
             iterations += 1;
-            let step = self.step(&at.x, &linear, damping);
             // Damping makes any step small, where unknowns are hard to tell apart little of it: that is no end.
-            let promised = self.step(&at.x, &linear, NO_DAMPING).expected;
-            let is_near = |expected: f64| expected.abs() <= self.settings.cost_tolerance * at.cost;
+            let least = self.settings.cost_tolerance * at.cost;
+            let is_near = |expected: f64| expected.abs() <= least;
             if is_near(promised) {
                 break IdentifyStop::Cost;
             }
+            let step = self.step(&at.x, &linear, damping);
             if is_near(step.expected) && refused > 0 {
                 break IdentifyStop::Stuck;
             }
@@ -118,6 +119,7 @@ impl<'m, 'a> Marquardt<'m, 'a> {
             if let Some(next) = taken {
                 at = next;
                 linear = self.misfit.linearise(&at)?;
+                promised = self.step(&at.x, &linear, NO_DAMPING).expected;
                 jacobians += 1;
                 // Nielsen's rule: no jumps as the model gets better.
                 damping *= f64::max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0).powi(3));

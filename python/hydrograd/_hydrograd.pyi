@@ -966,6 +966,9 @@ class Rollout:
     def controls(self) -> _Array:
         """The open-loop controls, (N, control_size), N and N m."""
     @property
+    def applied_controls(self) -> _Array:
+        """The controls that acted, those of the scene's or your own controller included, (N, control_size), N and N m."""
+    @property
     def positions(self) -> _Array:
         """Positions of the bodies' origins, (N + 1, bodies, 3), m, world axes."""
     @property

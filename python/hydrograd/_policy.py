@@ -25,7 +25,7 @@ class Policy(Protocol):
     """A controller: a pure function of what it observes, so that a rollout can be replayed.
 
     `act` is all that a rollout needs. A gradient needs `act_vjp(observation, control_bar)` too, the transpose of
-    `act`: from the cotangent of the controls (control_size,) the cotangents `(q_bar, v_bar)` or
+    `act`: from the cotangent of the controls (control_size,) the cotangents `(q_bar, v_bar)` or, with gains,
     `(q_bar, v_bar, gains_bar)`; `q_bar` is in the tangent space of the coordinates and `v_bar` like v, both (v_size,),
     and None is zero. A controller with adjustable `gains` (gains,) finds their gradient in `Gradient.gains`;
     `Simulator.with_gains` asks it for `with_gains(gains)`, the same controller with others.

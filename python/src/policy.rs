@@ -104,14 +104,28 @@ impl Controller {
         let bar = control_bar.as_slice().to_vec();
         let bar = array::to_python(py, bar, &[control_bar.len()])?;
         let given = method.call1((Self::observation(py, seen)?, bar))?;
+        // Without the gains' cotangent a descent on them would stand still, and say nothing.
+        let (least, wanted) = match self.gains.is_empty() {
+            true => (
+                2,
+                "a tuple (q_bar, v_bar) or (q_bar, v_bar, gains_bar)".into(),
+            ),
+            false => (
+                3,
+                format!(
+                    "a tuple (q_bar, v_bar, gains_bar), for it has {} gains (gains_bar=None: they change nothing)",
+                    self.gains.len()
+                ),
+            ),
+        };
         let parts: Vec<Bound<'_, PyAny>> = match given.cast::<PyTuple>() {
-            Ok(parts) if (2..=3).contains(&parts.len()) => parts.iter().collect(),
-            _ => {
-                return Err(input(
-                    "policy: act_vjp",
-                    format!("a value of type {}", given.get_type().name()?),
-                    "must be a tuple (q_bar, v_bar) or (q_bar, v_bar, gains_bar)",
-                ));
+            Ok(parts) if (least..=3).contains(&parts.len()) => parts.iter().collect(),
+            found => {
+                let given = match found {
+                    Ok(parts) => format!("a tuple of {}", parts.len()),
+                    Err(_) => format!("a value of type {}", given.get_type().name()?),
+                };
+                return Err(input("policy: act_vjp", given, format!("must be {wanted}")));
             }
         };
         let part = |at: usize, name: &str, size: usize| -> PyResult<Vec<f64>> {
@@ -158,12 +172,31 @@ impl Policy for Controller {
         self.gains.clone()
     }
 
-    /// The object makes the other one: `Simulator.with_gains` asks it, not the simulator's Rust side.
-    fn with_gains(&self, _: &[f64]) -> hydrograd::Result<Box<dyn Policy>> {
-        Err(hydrograd::Error::Unsupported {
-            what: "other gains of a controller written in Python".into(),
-            why: "the controller is an object of its own".into(),
-            instead: "use Simulator.with_gains".into(),
+    fn with_gains(&self, gains: &[f64]) -> hydrograd::Result<Box<dyn Policy>> {
+        asked(|py| {
+            let gains = array::to_python(py, gains.to_vec(), &[gains.len()])?;
+            let mut other = Self::new(
+                &with_gains(&self.object(py), gains.as_any())?,
+                (self.controls, self.velocities),
+            )?;
+            // Nobody else holds the one that was made just now.
+            other.object = Pointer::Strong(other.object(py).unbind());
+            Ok(Box::new(other) as Box<dyn Policy>)
         })
+    }
+}
+
+/// The controller `policy` with other gains, which it makes itself.
+pub fn with_gains<'py>(
+    policy: &Bound<'py, PyAny>,
+    gains: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    match policy.getattr_opt("with_gains")? {
+        Some(method) => method.call1((gains,)),
+        None => Err(input(
+            "with_gains",
+            format!("a controller of type {}", policy.get_type().name()?),
+            "must have a method with_gains(gains)",
+        )),
     }
 }

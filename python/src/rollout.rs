@@ -111,6 +111,13 @@ impl Rollout {
         array::transposed(py, controls, &[controls.nrows()])
     }
 
+    /// The controls that acted, those of the scene's or your own controller included, (N, control_size), N and N m.
+    #[getter]
+    fn applied_controls<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        let controls = self.inner.applied_controls();
+        array::transposed(py, &controls, &[controls.nrows()])
+    }
+
     /// Positions of the bodies' origins, (N + 1, bodies, 3), m, world axes.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> Numbers<'py> {

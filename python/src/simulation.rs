@@ -9,7 +9,7 @@ use crate::log;
 use crate::mapping;
 use crate::mesh::{Triangles, triangles};
 use crate::objective::Objective;
-use crate::policy::Controller;
+use crate::policy::{self, Controller};
 use crate::prepare::{Parts, Start, build, set_gains, warnings};
 use crate::rollout::Rollout;
 use crate::scene::{Scene, copied};
@@ -624,15 +624,7 @@ impl Simulator {
     /// The same with other gains of its controller, (gains,).
     fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Some(policy) = &self.policy {
-            let policy = policy.bind(gains.py());
-            return match policy.getattr_opt("with_gains")? {
-                Some(method) => self.with_policy(&method.call1((gains,))?),
-                None => Err(input(
-                    "with_gains",
-                    format!("a controller of type {}", policy.get_type().name()?),
-                    "must have a method with_gains(gains)",
-                )),
-            };
+            return self.with_policy(&policy::with_gains(policy.bind(gains.py()), gains)?);
         }
         let gains = array::row("with_gains: gains", gains)?;
         self.changed(|inner| set_gains(inner, &gains))

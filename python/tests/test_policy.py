@@ -108,6 +108,30 @@ def test_it_acts_as_the_same_controls_would(planar):
     seen = [hg.Observation(n, 0.02 * n, q, v) for n, (q, v) in enumerate(zip(rollout.q, rollout.v))]
     controls = np.array([policy.act(s) for s in seen[:-1]])
     assert np.array_equal(planar.rollout(controls).q, rollout.q)
+    assert np.array_equal(rollout.applied_controls, controls) and not rollout.controls.any()
+
+
+def test_what_acted_is_the_controllers_and_what_was_added(planar):
+    more = np.random.default_rng(0).normal(size=(6, planar.control_size))
+    rollout = planar.with_policy(Spring()).rollout(more)
+    seen = [hg.Observation(n, 0.02 * n, q, v) for n, (q, v) in enumerate(zip(rollout.q, rollout.v))]
+    controls = np.array([Spring().act(s) for s in seen[:-1]])
+    assert np.array_equal(rollout.applied_controls, more + controls) and np.array_equal(rollout.controls, more)
+
+
+def test_gains_without_a_cotangent_are_told(planar):
+    class Forgets(Spring):
+        def act_vjp(self, seen, control_bar):
+            return super().act_vjp(seen, control_bar)[:2]
+
+    rollout = planar.with_policy(Forgets()).rollout()
+    with pytest.raises(hg.InputError, match=r"a tuple of 2; must be a tuple \(q_bar, v_bar, gains_bar\), for it has 2 gains"):
+        rollout.vjp(v=np.ones_like(rollout.v))
+
+
+def test_gradcheck_asks_the_controller_for_other_gains(planar):
+    report = planar.with_policy(Spring()).gradcheck(3, directions=2)
+    assert report["max_rel_error"] < 1e-6 and any(d["group"] == "gains" for d in report["directions"])
     assert np.linalg.norm(rollout.q[-1] - rollout.q[0]) > 1e-4
 
 

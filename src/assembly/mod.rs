@@ -225,6 +225,7 @@ pub(crate) fn assemble(
         shapes,
         contact: None,
         limits: Vec::new(),
+        late: DVector::zeros(0),
         symmetric: Motions::default(),
         tree,
     };
@@ -266,6 +267,7 @@ pub(crate) fn assemble(
         system.contact = Some(made);
     }
     system.limits = limits::assemble(scene, dt, &system, &parameters, &q)?;
+    system.late = system.late_weights(&parameters, &q, dt)?;
     let coupled = coupled(scene, choices);
     system.symmetric = symmetry::free(scene, coupled, &system);
     let kept = symmetry::kept(scene, coupled, &system, &parameters);

@@ -116,6 +116,21 @@ impl Evaluation<'_> {
         out
     }
 
+    /// What the same are rounded by at the velocity `v`: the sum of the sizes of each one's generalised forces, user coordinates.
+    pub(super) fn load_effort(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let at = self.moving(&twists, v, control);
+        let mut out = DVector::zeros(v.len());
+        for force in self.system.smooth_forces() {
+            let mut loads = Loads::zeros(twists.len(), v.len());
+            force.effort(&at, &mut loads);
+            out +=
+                tree.project(&self.kinematics.columns, loads.wrenches).abs() + loads.joints.abs();
+        }
+        out
+    }
+
     /// Transpose of [`Evaluation::loads`]: the gradient of the power on the velocity `z`, added to `bar` and `out`.
     pub(super) fn loads_vjp(
         &self,

@@ -25,6 +25,7 @@ mod inertia;
 mod integrator;
 mod island_matrix;
 mod islands;
+mod late;
 mod limit;
 mod linearisation;
 mod momentum;

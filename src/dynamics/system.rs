@@ -53,6 +53,8 @@ pub struct System {
     pub contact: Option<ContactModel>,
     /// Limits of joints.
     pub limits: Vec<JointLimit>,
+    /// How far toward the end of a step velocities are at which stiff forces of joints are taken, from 0 (its mean) to 1, by integrators with a middle; empty where there are none.
+    pub late: DVector<f64>,
     /// Frame velocities of rigid motions of all bodies, or of all that feel one another through the water, that no joint and no wall of the water stands
     /// against. The momentum along each is theirs to keep.
     pub symmetric: Motions,

@@ -123,6 +123,16 @@ impl Rollout {
         &self.controls
     }
 
+    /// The controls that acted, those of the controller included, controls × N.
+    pub fn applied_controls(&self) -> DMatrix<f64> {
+        let mut out = self.controls.clone();
+        // The last state has no step after it.
+        for (mut to, sample) in out.column_iter_mut().zip(self.samples()) {
+            to.copy_from(&sample.control);
+        }
+        out
+    }
+
     /// Smallest gap between bodies or to a wall at states 0 … N; none where there is nothing to
     /// meet. Pairs that never move relative to one another, and those declared to overlap, don't
     /// count. They are measured at the first call.

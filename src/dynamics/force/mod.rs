@@ -307,6 +307,11 @@ pub trait ForceModel: Send + Sync {
     /// Adds what it does.
     fn add(&self, at: &Moving, out: &mut Loads);
 
+    /// Adds what [`ForceModel::add`] is rounded by: its terms without their signs, where it is a small difference of large ones.
+    fn effort(&self, at: &Moving, out: &mut Loads) {
+        self.add(at, out);
+    }
+
     /// Adds the tangent of [`ForceModel::add`] along a change of the velocity; nothing where it doesn't depend on it.
     fn jvp(&self, _at: &Moving, _change: &Velocity, _out: &mut Loads) {}
 
@@ -325,6 +330,12 @@ pub trait ForceModel: Send + Sync {
         for (z, bar) in z.iter().zip(bars) {
             self.vjp(at, z, bar);
         }
+    }
+
+    /// Whether it acts on joints with one coordinate alone, each by its own coordinate and velocity, and may resist them so stiffly that the mean velocity of a step won't do for it
+    /// (`dynamics::late`).
+    fn is_late(&self) -> bool {
+        false
     }
 
     /// Whether it is solved with contact, at the end of a step and in the velocity that the step moves by: a damper that is too stiff to act at any other. It is then

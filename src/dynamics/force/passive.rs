@@ -80,6 +80,17 @@ impl ForceModel for Passives {
         }
     }
 
+    fn effort(&self, at: &Moving, out: &mut Loads) {
+        let parameters = at.place.parameters;
+        for joint in &self.0 {
+            let rate = at.v[joint.v].abs();
+            let reach = at.place.q[joint.q].abs() + parameters[joint.rest].abs();
+            out.joints[joint.v] += parameters[joint.stiffness] * reach
+                + parameters[joint.damping] * rate
+                + parameters[joint.friction];
+        }
+    }
+
     fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads) {
         for joint in &self.0 {
             out.joints[joint.v] -= joint.slowing(at) * change.v[joint.v];
@@ -97,6 +108,10 @@ impl ForceModel for Passives {
             bar.parameters[joint.damping] -= rate * z;
             bar.parameters[joint.friction] -= joint.direction(rate).0 * z;
         }
+    }
+
+    fn is_late(&self) -> bool {
+        true
     }
 
     fn ties(&self) -> Option<Vec<[usize; 2]>> {

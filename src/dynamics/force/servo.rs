@@ -70,6 +70,15 @@ impl ForceModel for Servos {
         }
     }
 
+    fn effort(&self, at: &Moving, out: &mut Loads) {
+        let parameters = at.place.parameters;
+        for s in &self.each {
+            let reach = at.control[s.control].abs() + at.place.q[s.q].abs();
+            out.joints[s.v] +=
+                parameters[s.stiffness] * reach + self.slowing(s, parameters) * at.v[s.v].abs();
+        }
+    }
+
     fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads) {
         for s in &self.each {
             out.joints[s.v] -= self.slowing(s, at.place.parameters) * change.v[s.v];
@@ -86,6 +95,10 @@ impl ForceModel for Servos {
             bar.parameters[s.stiffness] += self.error(s, at) * z;
             bar.parameters[s.damping] -= at.v[s.v] * z;
         }
+    }
+
+    fn is_late(&self) -> bool {
+        true
     }
 
     fn ties(&self) -> Option<Vec<[usize; 2]>> {

@@ -142,6 +142,17 @@ impl ForceModel for Springs {
         }
     }
 
+    fn effort(&self, at: &Moving, out: &mut Loads) {
+        for spring in &self.0 {
+            let s = spring.stretched(at);
+            let parameters = at.place.parameters;
+            let reach = s.ends.iter().map(Vec3::norm).sum::<f64>();
+            let held = parameters[spring.stiffness] * (reach + parameters[spring.rest_length]);
+            let damped = parameters[spring.damping] * s.velocity.norm();
+            spring.pull(&s.ends, &((held + damped) * s.normal), &mut out.wrenches);
+        }
+    }
+
     fn jvp(&self, at: &Moving, change: &Velocity, out: &mut Loads) {
         for spring in &self.0 {
             let (ends, normal, _) = spring.line(&at.place);

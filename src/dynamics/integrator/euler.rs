@@ -32,6 +32,8 @@ use nalgebra::{DMatrix, DVector};
 const ITERATIONS: usize = 40;
 /// Residual that is accepted at the last iteration, and below which none is asked to fall.
 const ENOUGH: f64 = 1e-11;
+/// What is left of forces that cancel, of what they are by themselves, and is rounding.
+const ROUNDED: f64 = 1e-13;
 /// Distance from the world's origin, m, from which on its moments hide those of bodies of a metre or less: their part of them falls with its square.
 const FAR: f64 = 1e3;
 /// Shortest part of Newton's step.
@@ -93,7 +95,7 @@ impl<'s, 'a> Equation<'s, 'a> {
     /// What the velocity `v` leaves of it.
     pub fn at(&self, v: DVector<f64>) -> Result<Trial> {
         let (e, rule) = (self.e, self.rule);
-        let force = e.force(&v, &self.start.input.control)?;
+        let force = self.start.stage_force(e, &v, rule)?;
         let reached = self.hat + rule.impulse(e, &force);
         let xi = rule.reach * &v;
         let target = e.system.tree.chart_momentum(&e.q, &xi, &reached);
@@ -114,7 +116,7 @@ impl<'s, 'a> Equation<'s, 'a> {
 
     /// The factor of its matrix at a trial; none of a singular one.
     fn factor(&self, now: &Trial) -> Result<Option<StageFactor<'a>>> {
-        let made = StageMatrix::new(self.e, &now.v, &self.start.input.control)?;
+        let made = StageMatrix::new(&self.start, self.e, &now.v, self.rule)?;
         Ok(self.factored(&made, now))
     }
 
@@ -128,18 +130,21 @@ impl<'s, 'a> Equation<'s, 'a> {
         self.start.split.take(&self.e.mass_blocks().diagonal())
     }
 
-    /// What of a residual says nothing: what the water's solves leave open, where momenta are products of them.
-    pub fn noise(&self) -> f64 {
-        match self.e.scattered() {
-            Some(_) => noise(self.e),
-            None => 0.0,
-        }
+    /// Whether what is left at a trial says nothing: what the water's solves leave open, where momenta are products of them, or rounding of forces that cancel. What is at
+    /// rest has no momentum to measure that by.
+    pub fn is_noise(&self, now: &Trial) -> bool {
+        let in_water = self.e.scattered().map_or(0.0, |_| noise(self.e));
+        let rounded = || {
+            let effort = self.e.load_effort(&now.v, &self.start.input.control);
+            now.merit <= ROUNDED * self.sized(&(self.rule.h * effort))
+        };
+        now.residual <= in_water || rounded()
     }
 
     /// The factor at the first trial of a step, if the step isn't too long.
     pub fn first_factor(&self, now: &Trial) -> std::result::Result<Option<StageFactor<'a>>, Halt> {
         let start = &self.start;
-        let made = StageMatrix::new(self.e, &now.v, &start.input.control)?;
+        let made = StageMatrix::new(start, self.e, &now.v, self.rule)?;
         if start.plan.may_cut()
             && let Some(times) = made.excess(start.split, &now.v, self.rule)
         {
@@ -171,8 +176,8 @@ pub(super) fn solve_stage<'a>(
         let residual = now.residual;
         // Stop where rounding ends the quadratic convergence.
         let at_last = iteration + 1 == ITERATIONS && residual <= ENOUGH;
-        let noisy = residual <= equation.noise() && residual > 0.5 * previous;
-        if now.converged(previous) || noisy || at_last {
+        let stalled = residual > 0.5 * previous;
+        if now.converged(previous) || at_last || (stalled && equation.is_noise(&now)) {
             return Ok(now.into());
         }
         if !residual.is_finite() || iteration + 1 == ITERATIONS {
@@ -182,7 +187,7 @@ pub(super) fn solve_stage<'a>(
         let factor = if iteration == 0 {
             let factor = equation.first_factor(&now)?;
             let (weight, at) = (equation.weight(), |v| equation.at(v));
-            let ends = [equation.noise(), quasi::solved(e)];
+            let ends = (|now: &Trial| equation.is_noise(now), quasi::solved(e));
             let found = (factor.as_ref())
                 .and_then(|factor| quasi::descend(split, &weight, factor, &now, ends, at));
             if let Some(found) = found {
@@ -202,6 +207,9 @@ pub(super) fn solve_stage<'a>(
         while !(next.merit < now.merit || next.residual <= ENOUGH) {
             length *= 0.5;
             if length < SHORTEST {
+                if equation.is_noise(&now) {
+                    return Ok(now.into());
+                }
                 break 'newton;
             }
             next = equation.at(&now.v - length * &step)?;
@@ -282,14 +290,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         };
         Ok(Self {
             closure,
-            stage: AdjointStage::new(
-                start.split,
-                e,
-                &velocities.before,
-                control,
-                &reached,
-                rule(s),
-            )?,
+            stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
             contact: contact::Adjoint::new(start, velocities)?,
             reached,
         })

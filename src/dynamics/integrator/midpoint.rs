@@ -114,7 +114,8 @@ fn at_once(
         let m = middle(start, &v)?;
         Equation::new(start, &m, p, rule).at(v)
     };
-    let (weight, ends) = (equation.weight(), [noise(&m), quasi::solved(&m)]);
+    let is_noise = |now: &quasi::Trial| now.residual <= noise(&m) || equation.is_noise(now);
+    let (weight, ends) = (equation.weight(), (is_noise, quasi::solved(&m)));
     let found = quasi::descend(split, &weight, &factor, &first, ends, at);
     Ok(found)
 }
@@ -133,12 +134,11 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (s, before) = (start.stepper, &velocities.before);
         let middle = middle(start, before)?;
-        let control = &start.input.control;
-        let force = middle.force(before, control)?;
+        let force = start.stage_force(&middle, before, rule(s))?;
         let reached = start.momentum() + rule(s).impulse(&middle, &force);
         Ok(Self {
             contact: contact::Adjoint::new(start, velocities)?,
-            stage: AdjointStage::new(start.split, &middle, before, control, &reached, rule(s))?,
+            stage: AdjointStage::new(start, &middle, before, &reached, rule(s))?,
             middle,
             reached,
         })
@@ -151,12 +151,9 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (q, inputs, nv) = (along.q, along.inputs, start.v.len());
         let before = &self.contact.velocities.before;
         let h = 0.5 * s.dt;
-        let force = m.force_slopes(
-            before,
-            &start.input.control,
-            &split.free,
-            inputs.has_parameters(),
-        )?;
+        let (force, by_start) =
+            start.stage_force_slopes(m, before, rule(s), inputs.has_parameters())?;
+        let by_start = by_start * along.v;
         let momentum = m.momentum_slopes(before, &split.free, inputs.has_parameters())?;
         // q_m by q and by v.
         let advance = |q: &DMatrix<f64>, v: &DMatrix<f64>| {
@@ -174,12 +171,12 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
             frame.tr_mul(&impulse(&force.q)) + m.frame_momentum_slope(&self.reached) - &momentum.q;
         let matrix = IslandMatrix::whole(self.stage.matrix(m)? - bent * &by_v);
         let p = start.momentum_jvp(along)?;
-        let held = &p + impulse(&force.along(&middle, None, inputs));
+        let held = &p + impulse(&(force.along(&middle, None, inputs) + &by_start));
         let right = frame.tr_mul(&held) + m.frame_momentum_slope(&self.reached) * &middle
             - momentum.along(&middle, None, inputs);
         let v = solve_columns(&matrix, split, &right)?;
         let middle = middle + by_v * &v;
-        let hat = p + s.dt * force.along(&middle, Some(&v), inputs);
+        let hat = p + s.dt * (force.along(&middle, Some(&v), inputs) + by_start);
         Ok(self.contact.apply_jvp(start, along, &v, hat)?.0)
     }
 
@@ -201,6 +198,7 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
             back = self.through_middle(start, &w, &z)?;
         }
         bar.state.q += back.q;
+        bar.v += back.inner.v;
         bar.control += back.inner.control;
         bar.parameters.add(&back.inner.parameters);
         start.momentum_vjp(&(&z + m.frame_velocity(&w)), &mut bar)?;
@@ -232,6 +230,11 @@ impl<'a> Adjoint<'_, 'a> {
         // Gradient over q_m of −wᵀ{M v + p_rest − Xᵀ(p̂ + h f)} + zᵀ Δt f, and the rest of the cotangents.
         let mut inner = StepBar::zeros(m);
         inner.add(1.0, &m.force_vjp(before, control, &z_total)?);
+        if let Some(late) = start.late(m, before, rule(s)) {
+            let bars = m.late_force_vjp(&late, control, &z_total);
+            inner.add(1.0, &bars.force);
+            inner.v += bars.start;
+        }
         inner.add(-1.0, &m.momentum_vjp(before, w)?);
         inner.state.q += m.frame_velocity_vjp(w, &self.reached);
         split.forget_moved(&mut inner.state.q);

@@ -31,6 +31,7 @@ mod solved;
 mod split;
 mod stage_adjoint;
 mod stage_factor;
+mod stage_force;
 mod stage_matrix;
 mod stages;
 mod start;

@@ -48,14 +48,14 @@ pub(super) fn solved(e: &Linearisation) -> f64 {
     }
 }
 
-/// The solution from `first` on, `factor` being that of the stage's matrix about there, and `weight` the inertia of each free velocity; none where each step doesn't come much nearer, but for residuals under `noise`, of which
-/// nothing more can be told; those up to `solved` end it at once.
+/// The solution from `first` on, `factor` being that of the stage's matrix about there, and `weight` the inertia of each free velocity; none where each step doesn't come much nearer, but for trials of which `is_noise` says that
+/// nothing more can be told; residuals up to `solved` end it at once.
 pub(super) fn descend(
     split: &Split,
     weight: &DVector<f64>,
     factor: &StageFactor,
     first: &Trial,
-    [noise, solved]: [f64; 2],
+    (is_noise, solved): (impl Fn(&Trial) -> bool, f64),
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,
 ) -> Option<Trial> {
     // Steps made, each with its dual by the inertia.
@@ -66,11 +66,10 @@ pub(super) fn descend(
     for _ in 0..STEPS {
         let step = -&back;
         let now = at(&v + split.put(&step)).ok()?;
-        let stalled = now.residual > 0.5 * previous;
-        if now.residual <= solved || now.converged(previous) || (stalled && now.residual <= noise) {
+        let nearer = now.residual <= LEFT * previous;
+        if now.residual <= solved || now.converged(previous) || (!nearer && is_noise(&now)) {
             return Some(now);
         }
-        let nearer = now.residual <= LEFT * previous;
         if !nearer {
             return None;
         }
@@ -84,7 +83,7 @@ pub(super) fn descend(
         let (size, ahead) = (dual.dot(&step), dual.dot(&step) + dual.dot(&back));
         let sound = ahead > LEFT * size;
         if !sound {
-            return None;
+            return is_noise(&now).then_some(now);
         }
         improved.push(-&back / ahead);
         back *= size / ahead;

@@ -14,6 +14,11 @@ pub(super) struct Rule {
 }
 
 impl Rule {
+    /// Whether the stage has a configuration of its own, in the middle of the step.
+    pub fn is_middle(&self) -> bool {
+        self.reach == 0.0
+    }
+
     /// What a force adds to the momentum.
     pub fn impulse(&self, e: &Linearisation, force: &DVector<f64>) -> DVector<f64> {
         self.drifted(e, force, |drift, x| drift.carry(-self.h, x))
@@ -31,7 +36,7 @@ impl Rule {
         carry: impl Fn(&Drift, DVector<f64>) -> DVector<f64>,
     ) -> DVector<f64> {
         let x = self.h * x;
-        match self.reach == 0.0 {
+        match self.is_middle() {
             true => carry(&e.system.drift, x),
             false => x,
         }

@@ -4,6 +4,7 @@ use super::rule::Rule;
 use super::split::Split;
 use super::stage_factor::{StageFactor, StageMatrix};
 use super::stage_matrix::stage_matrix;
+use super::start::Start;
 use crate::dynamics::Linearisation;
 use crate::dynamics::island_matrix::IslandMatrix;
 use crate::solver::{Columns, Outcome, gmres};
@@ -23,6 +24,8 @@ pub(super) struct AdjointStage<'a> {
     control: DVector<f64>,
     reached: DVector<f64>,
     rule: Rule,
+    /// What is added to the diagonal of ∂f/∂v at that velocity, where some forces are late.
+    late: Option<DVector<f64>>,
     /// ∂f/∂v and the stage's matrix, where they are formed.
     formed: Option<[IslandMatrix; 2]>,
     /// Factor of the transposed matrix: all of it where it is formed.
@@ -35,17 +38,23 @@ impl<'a> AdjointStage<'a> {
     /// # Errors
     /// A solve of the coupling.
     pub fn new(
-        split: &Split,
+        start: &Start<'_, 'a>,
         e: &Linearisation<'a>,
         v: &DVector<f64>,
-        control: &DVector<f64>,
         reached: &DVector<f64>,
         rule: Rule,
     ) -> Result<Self> {
-        let made = StageMatrix::new(e, v, control)?;
+        let control = &start.input.control;
+        let made = StageMatrix::new(start, e, v, rule)?;
         let matrix = made.matrix(v, reached, rule);
-        let factor = made.factored(split, &matrix, true);
+        let factor = made.factored(start.split, &matrix, true);
+        let late = start.late(e, v, rule);
+        let late = late.map(|late| {
+            let [by_mean, _] = e.late_rates(&late, control);
+            by_mean
+        });
         Ok(Self {
+            late,
             v: v.clone(),
             control: control.clone(),
             reached: reached.clone(),
@@ -63,7 +72,9 @@ impl<'a> AdjointStage<'a> {
         if let Some(formed) = &self.formed {
             return Ok(formed.clone());
         }
-        let rates = e.force_velocity_blocks(&self.v, &self.control)?;
+        let mut rates = e.force_velocity_blocks(&self.v, &self.control)?;
+        let late = self.late.iter().flat_map(|late| late.iter().enumerate());
+        rates.subtract(late.map(|(i, x)| (i, i, -x)));
         let inertia = IslandMatrix::whole(e.mass_matrix().clone());
         e.check()?;
         let matrix = stage_matrix(e, &inertia, &self.v, &rates, &self.reached, self.rule);
@@ -85,7 +96,11 @@ impl<'a> AdjointStage<'a> {
     pub fn rates_vjp(&self, e: &Linearisation, z: &DVector<f64>) -> Result<DVector<f64>> {
         match &self.formed {
             Some([rates, _]) => Ok(rates.tr_times(z)),
-            None => Ok(e.force_vjp(&self.v, &self.control, z)?.v),
+            None => {
+                let mean = e.force_vjp(&self.v, &self.control, z)?.v;
+                let late = self.late.iter().map(|late| late.component_mul(z));
+                Ok(late.fold(mean, |sum, late| sum + late))
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 use super::rule::Rule;
 use super::split::Split;
 use super::stage_matrix::{excess, stage_matrix};
+use super::start::Start;
 use crate::Result;
 use crate::dynamics::Linearisation;
 use crate::dynamics::island_matrix::{IslandFactor, IslandMatrix};
@@ -31,14 +32,23 @@ pub(super) struct StageMatrix<'e, 'a> {
 }
 
 impl<'e, 'a> StageMatrix<'e, 'a> {
-    /// At the velocity `v`.
+    /// At the velocity `v`, of a step from `start`.
     ///
     /// # Errors
     /// A solve of the coupling.
-    pub fn new(e: &'e Linearisation<'a>, v: &DVector<f64>, control: &DVector<f64>) -> Result<Self> {
+    pub fn new(
+        start: &Start<'_, 'a>,
+        e: &'e Linearisation<'a>,
+        v: &DVector<f64>,
+        rule: Rule,
+    ) -> Result<Self> {
         let alone = e.alone()?;
-        let rates = alone.as_ref().unwrap_or(e);
-        let rates = rates.force_velocity_blocks(v, control)?;
+        let control = &start.input.control;
+        let mut rates = (alone.as_ref().unwrap_or(e)).force_velocity_blocks(v, control)?;
+        if let Some(late) = start.late(e, v, rule) {
+            let [by_mean, _] = e.late_rates(&late, control);
+            rates.subtract(by_mean.iter().enumerate().map(|(i, x)| (i, i, -x)));
+        }
         Ok(Self { e, alone, rates })
     }
 

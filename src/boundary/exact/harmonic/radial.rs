@@ -125,7 +125,7 @@ impl Grid {
             fall += STEP * (root(&self.nodes[last]) - 2.0);
             last += 1;
         }
-        let mut d = root(&self.nodes[last]);
+        let mut steps = Steps::from(root(&self.nodes[last]));
         let mut table = Vec::with_capacity(last / KEPT + 1);
         let mut keep = |k: usize, sum: f64, d: f64| {
             if k.is_multiple_of(KEPT) {
@@ -134,15 +134,14 @@ impl Grid {
             }
         };
         let mut sum = 0.0;
-        keep(last, sum, d);
+        keep(last, sum, steps.d);
         for k in (0..last).rev() {
             let stages = self.outside[k].map(|c| (p(&c), -c.kappa));
-            let values = radau(d, &stages, STEP);
+            let values = steps.radau(&stages, STEP);
             for (w, v) in BUTCHER[2].iter().zip(&values) {
                 sum += STEP * w * v;
             }
-            d = values[2];
-            keep(k, sum, d);
+            keep(k, sum, steps.d);
         }
         table.reverse();
         for entry in &mut table {
@@ -157,7 +156,7 @@ impl Grid {
         Radial {
             table,
             open: end.is_none(),
-            outside: d,
+            outside: steps.d,
             inside: self.inside(&p, odd),
         }
     }
@@ -186,10 +185,11 @@ impl Grid {
                 (false, _) => 0.5 * first,
             };
         }
+        let mut steps = Steps::from(d);
         for cell in &self.inside[from..] {
-            d = radau(d, &cell.map(|c| (p(&c), c.kappa)), self.stride)[2];
+            steps.radau(&cell.map(|c| (p(&c), c.kappa)), self.stride);
         }
-        d
+        steps.d
     }
 
     /// Where the surface ℓ is.
@@ -270,29 +270,77 @@ const BUTCHER: [[f64; 3]; 3] = [
     [(16.0 - ROOT_6) / 36.0, (16.0 + ROOT_6) / 36.0, 1.0 / 9.0],
 ];
 
-/// Stages of one step of `D' = p − D² + k D`, (p, k) at each stage; the last one is the step's end.
-fn radau(start: f64, stages: &[(f64, f64); 3], h: f64) -> [f64; 3] {
-    let mut d = Vec3::repeat(start);
-    for _ in 0..20 {
-        let mut residual = d.add_scalar(-start);
-        let mut jacobian = Mat3::identity();
-        for j in 0..3 {
-            let (p, k) = stages[j];
-            let rate = p + d[j] * (k - d[j]);
-            let slope = k - 2.0 * d[j];
-            for i in 0..3 {
-                residual[i] -= h * BUTCHER[i][j] * rate;
-                jacobian[(i, j)] -= h * BUTCHER[i][j] * slope;
+/// What of a step of Newton's method is so little that the next would be rounding.
+const QUADRATIC: f64 = 1e-9;
+
+/// Where the polynomial through a step's start and its stages goes at the stages of the next step.
+const AHEAD: [[f64; 4]; 3] = ahead();
+
+const fn ahead() -> [[f64; 4]; 3] {
+    let nodes = [0.0, ABSCISSAE[0], ABSCISSAE[1], ABSCISSAE[2]];
+    let mut out = [[1.0; 4]; 3];
+    let mut j = 0;
+    while j < 3 {
+        let mut i = 0;
+        while i < 4 {
+            let mut m = 0;
+            while m < 4 {
+                if m != i {
+                    out[j][i] *= (1.0 + ABSCISSAE[j] - nodes[m]) / (nodes[i] - nodes[m]);
+                }
+                m += 1;
             }
+            i += 1;
         }
-        let Some(inverse) = jacobian.try_inverse() else {
-            break;
-        };
-        let step = inverse * residual;
-        d -= step;
-        if step.amax() <= 1e-14 * d.amax() {
-            break;
+        j += 1;
+    }
+    out
+}
+
+/// Steps of `D' = p − D² + k D` on end.
+struct Steps {
+    /// D so far.
+    d: f64,
+    /// What the stages of the next step are guessed to be.
+    guess: Vec3,
+}
+
+impl Steps {
+    fn from(start: f64) -> Self {
+        Self {
+            d: start,
+            guess: Vec3::repeat(start),
         }
     }
-    d.into()
+
+    /// Stages of one step, (p, k) at each stage; the last one is the step's end.
+    fn radau(&mut self, stages: &[(f64, f64); 3], h: f64) -> [f64; 3] {
+        let (start, mut d) = (self.d, self.guess);
+        for _ in 0..20 {
+            let mut residual = d.add_scalar(-start);
+            let mut jacobian = Mat3::identity();
+            for j in 0..3 {
+                let (p, k) = stages[j];
+                let rate = p + d[j] * (k - d[j]);
+                let slope = k - 2.0 * d[j];
+                for i in 0..3 {
+                    residual[i] -= h * BUTCHER[i][j] * rate;
+                    jacobian[(i, j)] -= h * BUTCHER[i][j] * slope;
+                }
+            }
+            let Some(inverse) = jacobian.try_inverse() else {
+                break;
+            };
+            let step = inverse * residual;
+            d -= step;
+            if step.amax() <= QUADRATIC * d.amax() {
+                break;
+            }
+        }
+        let through = [start, d[0], d[1], d[2]];
+        let sum = |weights: &[f64; 4]| weights.iter().zip(through).map(|(w, x)| w * x).sum();
+        self.guess = Vec3::from(AHEAD.each_ref().map(sum));
+        self.d = d[2];
+        d.into()
+    }
 }

@@ -36,6 +36,7 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::velocity_euler::Adjoint::jvp" => |c| both(Integrator::VelocityEuler, c),
         "dynamics::integrator::contact::Adjoint::apply_jvp" =>
             |c| all(contact::INTEGRATORS.map(|i| pressed(i, c))),
+        "dynamics::integrator::middle_contact::Adjoint::apply_jvp" => |c| pressed(Integrator::Midpoint, c),
         "simulate::tangents::Rollout::jvp" => |c| all(INTEGRATORS.map(|i| rollout(i, &["positions", "rotations"], c))),
         "simulate::observable::pose::Positions::jvp" => |c| rollout(Integrator::Rk2, &["positions"], c),
         "simulate::observable::pose::Rotations::jvp" => |c| rollout(Integrator::Rk2, &["rotations"], c),

@@ -223,8 +223,20 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::force::lubrication::Lubrication::vjp",
     ),
     (
-        "dynamics::integrator::contact::Adjoint::solve_vjp",
+        "dynamics::integrator::contact::Problem::solve_vjp",
         "dynamics::integrator::contact::Adjoint::apply_vjp",
+    ),
+    (
+        "dynamics::integrator::contact::Problem::pressed_vjp",
+        "dynamics::integrator::contact::Adjoint::apply_vjp",
+    ),
+    (
+        "dynamics::late::Evaluation::late_force_vjp",
+        "dynamics::integrator::midpoint::Adjoint::vjp",
+    ),
+    (
+        "dynamics::late::Evaluation::late_loads_vjp",
+        "dynamics::integrator::midpoint::Adjoint::vjp",
     ),
     (
         "dynamics::balance::Evaluation::loads_vjp",
@@ -325,7 +337,11 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::euler::Adjoint::vjp",
     ),
     (
-        "dynamics::integrator::contact::Adjoint::solve_jvp",
+        "dynamics::integrator::contact::Problem::solve_jvp",
+        "dynamics::integrator::contact::Adjoint::apply_jvp",
+    ),
+    (
+        "dynamics::integrator::contact::Problem::pressed_jvp",
         "dynamics::integrator::contact::Adjoint::apply_jvp",
     ),
     (

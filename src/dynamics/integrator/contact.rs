@@ -60,9 +60,9 @@ struct Step {
     left: Vec<f64>,
 }
 
-/// The velocity after contact, from the one before it; the same bits where nothing presses.
-pub(super) fn solve(start: &Start, before: &DVector<f64>) -> Result<DVector<f64>> {
-    let (e, split, dt) = (start.near, start.split, start.stepper.dt);
+/// The velocity after contact that acts for `dt` (s), from the one before it; the same bits where nothing presses.
+pub(super) fn solve(start: &Start, before: &DVector<f64>, dt: f64) -> Result<DVector<f64>> {
+    let (e, split) = (start.near, start.split);
     e.check_damping()?;
     // At no force v* is the least of the convex problem.
     if split.free.is_empty() || !e.contact_acts(before) {
@@ -181,29 +181,46 @@ pub(super) fn apply(
     before: DVector<f64>,
     hat: DVector<f64>,
 ) -> Result<(State, Stages)> {
-    let after = solve(start, &before)?;
-    let velocities = ContactVelocities { before, after };
+    let after = solve(start, &before, start.stepper.dt)?;
+    let velocities = ContactVelocities::new(before, after);
     let next = reached(start, &velocities, hat);
     Ok((next, Stages::Contact(velocities)))
 }
 
 /// The state at the end, once contact is solved.
 pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
-    let ContactVelocities { before, after } = velocities;
-    let hat = match start.near.contact_acts(before) {
-        true => {
-            // Where the momenta are taken drifts on during the step.
-            let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
-            hat + drift.carry(dt, dt * start.near.contact_force(after, Dual::Frame))
-        }
-        false => hat,
-    };
+    let ContactVelocities { before, after, .. } = velocities;
+    let hat = pressed(start, before, after, hat);
     start.next_state(start.advance(after), hat)
 }
 
-/// What the derivatives of [`solve`] and [`apply`] need.
+/// The frame momenta `hat` with what contact adds in a step, from the velocities before and after it.
+pub(super) fn pressed(
+    start: &Start,
+    before: &DVector<f64>,
+    after: &DVector<f64>,
+    hat: DVector<f64>,
+) -> DVector<f64> {
+    if !start.near.contact_acts(before) {
+        return hat;
+    }
+    // Where the momenta are taken drifts on during the step.
+    let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+    hat + drift.carry(dt, dt * start.near.contact_force(after, Dual::Frame))
+}
+
+/// What the derivatives of [`apply`] need.
 pub(super) struct Adjoint<'s, 'a> {
     pub velocities: &'s ContactVelocities,
+    pub problem: Problem<'a>,
+}
+
+/// A problem of contact that has been solved: what the derivatives of [`solve`] and [`pressed`] need.
+pub(super) struct Problem<'a> {
+    before: DVector<f64>,
+    after: DVector<f64>,
+    /// For which contact acts, s.
+    time: f64,
     acting: Acting<'a>,
 }
 
@@ -216,23 +233,32 @@ enum Acting<'a> {
     Solved(Hessian<'a>),
 }
 
-impl<'s, 'a> Adjoint<'s, 'a> {
-    /// At a step's velocities before and after contact.
-    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
+impl<'a> Problem<'a> {
+    /// With the velocities before and after contact that acts for `time` (s).
+    pub fn new(
+        start: &Start<'_, 'a>,
+        before: &DVector<f64>,
+        after: &DVector<f64>,
+        time: f64,
+    ) -> Result<Self> {
         let (e, split) = (start.near, start.split);
-        let acting = if !e.contact_acts(&velocities.before) {
+        let acting = if !e.contact_acts(before) {
             Acting::No
         } else if split.free.is_empty() {
             Acting::Driven
         } else {
-            let (after, dt) = (&velocities.after, start.stepper.dt);
-            Acting::Solved(Hessian::new(e, split, after, dt, &mut Places::default())?)
+            Acting::Solved(Hessian::new(e, split, after, time, &mut Places::default())?)
         };
-        Ok(Self { velocities, acting })
+        Ok(Self {
+            before: before.clone(),
+            after: after.clone(),
+            time,
+            acting,
+        })
     }
 
     /// Tangents of [`solve`], from those of the velocity before contact.
-    fn solve_jvp(
+    pub fn solve_jvp(
         &self,
         start: &Start,
         along: &StepTangents,
@@ -242,12 +268,11 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             return Ok(before.clone());
         };
         let (e, near, split) = (start.e, start.near, start.split);
-        let velocities = self.velocities;
-        let change = &velocities.after - &velocities.before;
-        let pressed = near.contact_force_slopes(&velocities.after, Dual::User, &split.free);
+        let change = &self.after - &self.before;
+        let pressed = near.contact_force_slopes(&self.after, Dual::User, &split.free);
         let inertia = e.mass_slopes(&change, &split.free, along.inputs.has_parameters())?;
         let moved = columns(before, |v| e.mass_times(v));
-        let right = moved + start.stepper.dt * pressed.along(along.q, None, along.inputs)
+        let right = moved + self.time * pressed.along(along.q, None, along.inputs)
             - inertia.along(along.q, None, along.inputs);
         let mut after = before.clone();
         let free = hessian.solve_columns(&split.take_rows(&right));
@@ -256,46 +281,6 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             after.row_mut(i).copy_from(&free.row(k));
         }
         Ok(after)
-    }
-
-    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity after it.
-    pub fn apply_jvp(
-        &self,
-        start: &Start,
-        along: &StepTangents,
-        before: &DMatrix<f64>,
-        mut hat: DMatrix<f64>,
-    ) -> Result<(StateTangents, DMatrix<f64>)> {
-        let velocity = &self.velocities.after;
-        let after = self.solve_jvp(start, along, before)?;
-        if !matches!(self.acting, Acting::No) {
-            let entries = &start.split.free;
-            let pressed = start
-                .near
-                .contact_force_slopes(velocity, Dual::Frame, entries);
-            let pressed = pressed.along(along.q, Some(&after), along.inputs);
-            let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
-            hat += columns(&pressed, |g| drift.carry(dt, dt * g));
-        }
-        let next = StateTangents {
-            q: start.advance_jvp(velocity, along.q, &after),
-            y: start.next_momenta(hat),
-        };
-        Ok((next, after))
-    }
-
-    /// Tangents of the velocity after contact alone, for integrators that carry it.
-    pub fn velocity_jvp(
-        &self,
-        start: &Start,
-        along: &StepTangents,
-        before: &DMatrix<f64>,
-    ) -> Result<StateTangents> {
-        let after = self.solve_jvp(start, along, before)?;
-        Ok(StateTangents {
-            q: start.advance_jvp(&self.velocities.after, along.q, &after),
-            y: after,
-        })
     }
 
     /// Transpose of [`solve`]: from the cotangent of the velocity after contact to that of the one before; the rest is added to
@@ -310,13 +295,12 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             return Ok(after_bar.clone());
         };
         let (e, near, split) = (start.e, start.near, start.split);
-        let ContactVelocities { before, after } = self.velocities;
         let w = split.put(&hessian.solve(&split.take(after_bar)));
         bar.add(
-            start.stepper.dt,
-            &near.contact_force_vjp(after, &w, Dual::User),
+            self.time,
+            &near.contact_force_vjp(&self.after, &w, Dual::User),
         );
-        bar.add(-1.0, &e.mass_vjp(&(after - before), &w)?);
+        bar.add(-1.0, &e.mass_vjp(&(&self.after - &self.before), &w)?);
         // Driven velocities are what they are.
         let mut before_bar = after_bar.clone();
         let moved = e.mass_times(&w);
@@ -324,6 +308,83 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             before_bar[i] = moved[i];
         }
         Ok(before_bar)
+    }
+
+    /// Tangents of [`pressed`], from those of the velocity after contact and of the momenta before it.
+    pub fn pressed_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        after: &DMatrix<f64>,
+        hat: DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        if matches!(self.acting, Acting::No) {
+            return hat;
+        }
+        let (near, entries) = (start.near, &start.split.free);
+        let pressed = near.contact_force_slopes(&self.after, Dual::Frame, entries);
+        let pressed = pressed.along(along.q, Some(after), along.inputs);
+        let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+        hat + columns(&pressed, |g| drift.carry(dt, dt * g))
+    }
+
+    /// Transpose of [`pressed`]: the cotangent of the velocity after contact; the rest is added to `bar`.
+    pub fn pressed_vjp(
+        &self,
+        start: &Start,
+        hat_bar: &DVector<f64>,
+        bar: &mut StepBar,
+    ) -> DVector<f64> {
+        if matches!(self.acting, Acting::No) {
+            return DVector::zeros(hat_bar.len());
+        }
+        let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+        let impulse_bar = drift.carry_back(dt, hat_bar.clone());
+        let pressed = (start.near).contact_force_vjp(&self.after, &impulse_bar, Dual::Frame);
+        bar.add(dt, &pressed);
+        dt * pressed.v
+    }
+}
+
+impl<'s, 'a> Adjoint<'s, 'a> {
+    /// At a step's velocities before and after contact.
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
+        let ContactVelocities { before, after, .. } = velocities;
+        Ok(Self {
+            velocities,
+            problem: Problem::new(start, before, after, start.stepper.dt)?,
+        })
+    }
+
+    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity after it.
+    pub fn apply_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+        hat: DMatrix<f64>,
+    ) -> Result<(StateTangents, DMatrix<f64>)> {
+        let after = self.problem.solve_jvp(start, along, before)?;
+        let hat = self.problem.pressed_jvp(start, along, &after, hat);
+        let next = StateTangents {
+            q: start.advance_jvp(&self.velocities.after, along.q, &after),
+            y: start.next_momenta(hat),
+        };
+        Ok((next, after))
+    }
+
+    /// Tangents of the velocity after contact alone, for integrators that carry it.
+    pub fn velocity_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+    ) -> Result<StateTangents> {
+        let after = self.problem.solve_jvp(start, along, before)?;
+        Ok(StateTangents {
+            q: start.advance_jvp(&self.velocities.after, along.q, &after),
+            y: after,
+        })
     }
 
     /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, with that of the velocity after it from elsewhere; the rest is added
@@ -335,20 +396,14 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         own: Option<&DVector<f64>>,
         bar: &mut StepBar,
     ) -> Result<(DVector<f64>, DVector<f64>)> {
-        let (dt, after) = (start.stepper.dt, &self.velocities.after);
-        let (q_bar, mut after_bar) = start.advance_vjp(after, &next_bar.q);
+        let (q_bar, mut after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
         bar.state.q += q_bar;
         if let Some(own) = own {
             after_bar += own;
         }
         let hat_bar = start.next_momentum_bar(next_bar);
-        if matches!(self.acting, Acting::No) {
-            return Ok((after_bar, hat_bar));
-        }
-        let impulse_bar = start.stepper.system.drift.carry_back(dt, hat_bar.clone());
-        let pressed = (start.near).contact_force_vjp(after, &impulse_bar, Dual::Frame);
-        bar.add(dt, &pressed);
-        let before_bar = self.solve_vjp(start, &(after_bar + dt * &pressed.v), bar)?;
+        after_bar += self.problem.pressed_vjp(start, &hat_bar, bar);
+        let before_bar = self.problem.solve_vjp(start, &after_bar, bar)?;
         Ok((before_bar, hat_bar))
     }
 }

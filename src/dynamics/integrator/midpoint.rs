@@ -7,14 +7,11 @@
 //! q_m (one evaluation each); the adjoint solves with the transpose of that splitting by GMRES, which gets there wherever the step does, the tangent for all
 //! directions at once.
 //!
-//! With contact, q⁺ = q ⊕ Δt v_s and p̂⁺ = p̂ + Δt f + Δt g(q, v_s), where v_s follows from v by
-//! [`contact::solve`] at q: the position is stepped implicitly, so contact is stable at any stiffness, and of
-//! first order. The impulse acts at once at the beginning of a step, the weight in its course: a body at rest under
-//! weight reads −½ g Δt at the states, between which its mean velocity v_s is zero. q_m still is on the way that
-//! contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
+//! Contact is solved at q for the mean velocity and for the one at the end ([`middle_contact`]): the position is stepped implicitly, so that contact is stable at any stiffness, and of
+//! first order. q_m still is on the way that contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
 
-use super::contact;
 use super::euler::{Equation, noise, solve_stage};
+use super::middle_contact;
 use super::plan::Halt;
 use super::quasi;
 use super::rule::Rule;
@@ -66,7 +63,7 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     let mut stage = split.complete(start.v);
     if let Some(found) = at_once(start, &p, &stage)? {
         let y = &p + s.dt * found.force;
-        return Ok(contact::apply(start, found.v, y)?);
+        return Ok(middle_contact::apply(start, found.v, y)?);
     }
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
@@ -77,7 +74,7 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            return Ok(contact::apply(start, stage, y)?);
+            return Ok(middle_contact::apply(start, stage, y)?);
         }
         previous = moved;
     }
@@ -122,7 +119,7 @@ fn at_once(
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: contact::Adjoint<'s, 'a>,
+    contact: middle_contact::Adjoint<'s, 'a>,
     /// The system in the middle of the step.
     middle: Linearisation<'a>,
     /// p̂ + ½Δt f.
@@ -137,7 +134,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         let force = start.stage_force(&middle, before, rule(s))?;
         let reached = start.momentum() + rule(s).impulse(&middle, &force);
         Ok(Self {
-            contact: contact::Adjoint::new(start, velocities)?,
+            contact: middle_contact::Adjoint::new(start, velocities)?,
             stage: AdjointStage::new(start, &middle, before, &reached, rule(s))?,
             middle,
             reached,
@@ -177,13 +174,13 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let v = solve_columns(&matrix, split, &right)?;
         let middle = middle + by_v * &v;
         let hat = p + s.dt * (force.along(&middle, Some(&v), inputs) + by_start);
-        Ok(self.contact.apply_jvp(start, along, &v, hat)?.0)
+        self.contact.apply_jvp(start, along, &v, hat)
     }
 
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, split, m) = (start.stepper, start.split, &self.middle);
         let mut bar = StepBar::zeros(start.e);
-        let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, None, &mut bar)?;
+        let (v_bar_next, z) = self.contact.apply_vjp(start, next_bar, &mut bar)?;
         let v_bar_force = s.dt * self.stage.rates_vjp(m, &z)?;
         let fixed = v_bar_next + v_bar_force;
         // Jᵀ w = fixed + (∂q_m/∂v)ᵀ q̄_m(w, z), of free velocities; q̄_m is linear in w and z.

@@ -19,6 +19,7 @@ mod contact;
 mod energy;
 mod euler;
 mod hessian;
+mod middle_contact;
 mod midpoint;
 mod pieces;
 mod plan;
@@ -87,6 +88,8 @@ impl Integrator {
         match self {
             Integrator::Rk2 => 2,
             Integrator::Rk4 => 4,
+            // That at the start, of velocities before and after contact, and of that at the end.
+            Integrator::Midpoint => 4,
             // That at the start, and of velocities before and after contact.
             _ => 3,
         }

@@ -160,7 +160,7 @@ impl<'a> Stepper<'a> {
             Stages::RungeKutta(_) => Stops::default(),
         };
         let own = stages.contact_velocities();
-        let own = own.into_iter().flat_map(|c| [&c.before, &c.after]);
+        let own = (own.into_iter()).flat_map(|c| [&c.before, &c.after].into_iter().chain(&c.end));
         Ok(Piece {
             answers: e.answers(std::iter::once(v).chain(own)),
             next,
@@ -186,7 +186,7 @@ impl<'a> Stepper<'a> {
                 Some(points) => points,
                 None => system.contact_points(self.parameters, &kinematics.poses)?,
             };
-            let acting = stages.contact_velocities().map_or(v, |v| &v.after);
+            let acting = stages.contact_velocities().map_or(v, |v| v.acting());
             let twists = system.tree.twists(&kinematics, acting);
             let mut found = contact_forces(&points, &twists, slack);
             if record.pieces() > 1 {

@@ -37,7 +37,7 @@ impl Stepper<'_> {
             add(&contact, &mut out.contact);
         }
         for (state, v, _, stages) in record.parts() {
-            let acting = stages.contact_velocities().map_or(v, |v| &v.after);
+            let acting = stages.contact_velocities().map_or(v, |v| v.acting());
             if self.integrator.solves_contact() {
                 for (k, limit) in system.limits.iter().enumerate() {
                     let limit = limit.sharpened(record.plan.of_limit(k));

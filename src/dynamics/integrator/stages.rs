@@ -11,8 +11,26 @@ use nalgebra::DVector;
 pub struct ContactVelocities {
     /// With which the step would end without contact.
     pub before: DVector<f64>,
-    /// By which it moves, and with which contacts act.
+    /// By which it moves.
     pub after: DVector<f64>,
+    /// That at its end, where that isn't the one it moves by.
+    pub end: Option<DVector<f64>>,
+}
+
+impl ContactVelocities {
+    /// Before and after contact, of a step that ends with the velocity by which it moves.
+    pub(super) fn new(before: DVector<f64>, after: DVector<f64>) -> Self {
+        Self {
+            before,
+            after,
+            end: None,
+        }
+    }
+
+    /// With which contacts act.
+    pub fn acting(&self) -> &DVector<f64> {
+        self.end.as_ref().unwrap_or(&self.after)
+    }
 }
 
 /// Nodes and weights of a method; stage i starts from stage i − 1 over `nodes[i]` of the step.

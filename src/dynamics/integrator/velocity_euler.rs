@@ -36,10 +36,10 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let (s, split) = (start.stepper, start.split);
     let (a, _) = acceleration(start)?;
     let before = split.complete(&(start.v + s.dt * a));
-    let after = contact::solve(start, &before)?;
+    let after = contact::solve(start, &before, s.dt)?;
     let q = start.advance(&after);
     let next = start.next_state(q, after.clone());
-    Ok((next, Stages::Contact(ContactVelocities { before, after })))
+    Ok((next, Stages::Contact(ContactVelocities::new(before, after))))
 }
 
 /// What the derivatives of a step need.
@@ -89,7 +89,10 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (q_bar, mut after_bar) = start.advance_vjp(after, &next_bar.q);
         bar.state.q += q_bar;
         after_bar += &next_bar.y;
-        let mut v_bar = self.contact.solve_vjp(start, &after_bar, &mut bar)?;
+        let mut v_bar = self
+            .contact
+            .problem
+            .solve_vjp(start, &after_bar, &mut bar)?;
         split.forget_driven(&mut v_bar);
         bar.v += &v_bar;
         // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt, v_d at the step's end.

@@ -1,0 +1,109 @@
+//! Contact in a step whose forces are those of its middle: solved twice, as for any step ([`super::contact`]).
+//!
+//! From the velocity v₀ at the step's start and its mean v without contact
+//!
+//! ```text
+//! M (v_s − v) = ½ Δt g(q, v_s)            q⁺ = q ⊕ Δt v_s
+//! M (v_e − (2v − v₀)) = Δt g(q, v_e)      p̂⁺ = p̂ + Δt f + Δt g(q, v_e)
+//! ```
+//!
+//! The mean velocity v_s has half of contact's impulse in it, as it has of all other forces', and the velocity v_e at the end the whole: what rests reads as at rest, where the one
+//! problem would leave the half of what presses in its velocity. Both stop at what they meet.
+
+use super::contact::{Problem, pressed, solve};
+use super::stages::{ContactVelocities, Stages};
+use super::start::Start;
+use super::{State, StateBar, StateTangents, StepBar, StepTangents};
+use crate::Result;
+use nalgebra::{DMatrix, DVector};
+
+/// The end of a step from its mean velocity and the frame momenta before contact.
+pub(super) fn apply(
+    start: &Start,
+    mean: DVector<f64>,
+    hat: DVector<f64>,
+) -> Result<(State, Stages)> {
+    let dt = start.stepper.dt;
+    let free = at_end(start, &mean);
+    let after = solve(start, &mean, 0.5 * dt)?;
+    let end = solve(start, &free, dt)?;
+    let hat = pressed(start, &free, &end, hat);
+    let next = start.next_state(start.advance(&after), hat);
+    let velocities = ContactVelocities {
+        before: mean,
+        after,
+        end: Some(end),
+    };
+    Ok((next, Stages::Contact(velocities)))
+}
+
+/// The velocity at the end of a step without contact; where something drives it, the mean.
+fn at_end(start: &Start, mean: &DVector<f64>) -> DVector<f64> {
+    let mut out = mean.clone();
+    for &i in &start.split.free {
+        out[i] = 2.0 * mean[i] - start.v[i];
+    }
+    out
+}
+
+/// What the derivatives of [`apply`] need.
+pub(super) struct Adjoint<'s, 'a> {
+    pub velocities: &'s ContactVelocities,
+    mean: Problem<'a>,
+    end: Problem<'a>,
+}
+
+impl<'s, 'a> Adjoint<'s, 'a> {
+    /// At a step's velocities before and after contact.
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
+        let dt = start.stepper.dt;
+        let ContactVelocities { before, after, .. } = velocities;
+        let free = at_end(start, before);
+        Ok(Self {
+            velocities,
+            mean: Problem::new(start, before, after, 0.5 * dt)?,
+            end: Problem::new(start, &free, velocities.acting(), dt)?,
+        })
+    }
+
+    /// Tangents of [`apply`], from those of the mean velocity and of the momenta before contact.
+    pub fn apply_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        mean: &DMatrix<f64>,
+        hat: DMatrix<f64>,
+    ) -> Result<StateTangents> {
+        let after = self.mean.solve_jvp(start, along, mean)?;
+        let mut free = mean.clone();
+        for &i in &start.split.free {
+            free.set_row(i, &(2.0 * mean.row(i) - along.v.row(i)));
+        }
+        let end = self.end.solve_jvp(start, along, &free)?;
+        let hat = self.end.pressed_jvp(start, along, &end, hat);
+        Ok(StateTangents {
+            q: start.advance_jvp(&self.velocities.after, along.q, &after),
+            y: start.next_momenta(hat),
+        })
+    }
+
+    /// Transpose of [`apply`]: cotangents of the mean velocity and of the momenta before contact; the rest is added to `bar`.
+    pub fn apply_vjp(
+        &self,
+        start: &Start,
+        next_bar: &StateBar,
+        bar: &mut StepBar,
+    ) -> Result<(DVector<f64>, DVector<f64>)> {
+        let (q_bar, after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
+        bar.state.q += q_bar;
+        let hat_bar = start.next_momentum_bar(next_bar);
+        let end_bar = self.end.pressed_vjp(start, &hat_bar, bar);
+        let mut free_bar = self.end.solve_vjp(start, &end_bar, bar)?;
+        for &i in &start.split.free {
+            bar.v[i] -= free_bar[i];
+            free_bar[i] *= 2.0;
+        }
+        let mean_bar = self.mean.solve_vjp(start, &after_bar, bar)?;
+        Ok((mean_bar + free_bar, hat_bar))
+    }
+}

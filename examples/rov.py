@@ -25,7 +25,9 @@ PIDs; with the current learnt it is there first and keeps the place best, while 
 roll and pitch, better (0.06° to its 0.11°, RMS). No command exceeds 40 N, and the fingertip comes no nearer to the wall
 than 94 mm. A plan takes 43 ms (23 Hz would be possible), at most 78 ms, and the very first some more; to learn takes
 15 ms, and 165 ms where new models are made, which is longer than the tenth of a second that a robot has: no time passes
-here while controllers think.
+here while controllers think. All steps are momentum Euler's, by which the gains were tuned; it damps. With the default
+integrator, as with finer steps, those PIDs chatter (over 5 s: roll and pitch off by 1.2°, RMS, the vehicle by 5.0 mm), and
+MPC that learns does as well as before (0.2°, 4.5 mm).
 """
 
 from __future__ import annotations
@@ -108,7 +110,7 @@ def scene_of(current, drag):
 
 
 def simulator(current, step, drag, cache):
-    """The scene made ready, with few points a body; their setup is kept in a folder. The PIDs' gains were tuned with this integrator."""
+    """The scene made ready, with few points a body; their setup is kept in a folder. The PIDs' gains were tuned with this integrator and step."""
     return hg.Simulator(scene_of(current, drag), step, fidelity="reduced", rank=20, cache=cache, integrator="momentum-euler")
 
 

@@ -1016,7 +1016,7 @@ class Rollout:
         """What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
         numbers count from the end."""
     def imu(self, site: str) -> _Array:
-        """What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes."""
+        """What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes. At the last state no step begins: no control acts, and nothing touches."""
     def flow(self, state: int, points: ArrayLike) -> _Array:
         """The water's velocity at `points` (n, 3), m, at state `state`: (n, 3), m/s, world axes, the current included. It takes a
         solve. Points within a body, behind a wall, or too near to an edge or to two

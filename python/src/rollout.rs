@@ -279,7 +279,7 @@ impl Rollout {
         Ok(made.into_iter().map(SurfacePressure).collect())
     }
 
-    /// What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes.
+    /// What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes. At the last state no step begins: no control acts, and nothing touches.
     fn imu<'py>(&self, py: Python<'py>, site: &str) -> Numbers<'py> {
         let n = self.inner.states().len();
         let (inner, site) = (self.inner.clone(), site.to_string());

@@ -624,6 +624,20 @@ impl Simulator {
     /// The same with other gains of its controller, (gains,).
     fn with_gains(&self, gains: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Some(policy) = &self.policy {
+            let (given, own) = (
+                array::row("with_gains: gains", gains)?,
+                self.inner.policy().gains(),
+            );
+            if given.len() != own.len() {
+                return Err(input(
+                    "with_gains: gains",
+                    format!("{} numbers", given.len()),
+                    format!(
+                        "must be {} numbers, as many as the controller has",
+                        own.len()
+                    ),
+                ));
+            }
             return self.with_policy(&policy::with_gains(policy.bind(gains.py()), gains)?);
         }
         let gains = array::row("with_gains: gains", gains)?;

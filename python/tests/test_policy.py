@@ -303,3 +303,10 @@ def test_sweeps_at_the_same_time_on_one_rollout(planar):
         assert found is None or scale == 1.0 and np.array_equal(found, right)
     # What was raised then is over.
     assert np.array_equal(rollout.vjp(v=seed).gains, right)
+
+
+def test_gains_are_as_many_as_the_controller_has(planar):
+    sim = planar.with_policy(Spring())
+    assert np.array_equal(sim.with_gains([1.0, 2.0]).gains, [1.0, 2.0])
+    with pytest.raises(hg.InputError, match="3 numbers; must be 2 numbers"):
+        sim.with_gains([1.0, 2.0, 3.0])

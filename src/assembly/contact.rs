@@ -16,6 +16,8 @@ pub(super) const STIFFNESS: f64 = 10.0;
 const PLATE: f64 = 0.04;
 /// The same as [`STIFFNESS`] of what it weighs: ω Δt is no less than 1.6, and little comes back.
 const OF_PLATE: f64 = 2.5;
+/// How deep the heaviest moving body may rest in the gap at which surfaces touch, of that.
+const SUNK: f64 = 0.5;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
 /// Gap at which surfaces touch, of the smallest body's radius: distances are smooth outside a body only.
@@ -123,8 +125,16 @@ pub(super) fn assemble(
         true => bodies().map(film).fold(0.0, f64::max),
         false => 0.0,
     };
-    let stiffness =
-        (given.stiffness).unwrap_or((STIFFNESS * heaviest).max(OF_PLATE * films) / (dt * dt));
+    // Small bodies have a thin gap to rest in, however long the step is.
+    let pressing =
+        |b: usize| (parameters.mass(b) - parameters.density() * parameters.volume(b)).abs();
+    let load = bodies().map(pressing).fold(0.0, f64::max) * Vec3::from(scene.gravity).norm();
+    let held = match gap > 0.0 {
+        true => load / (SUNK * gap),
+        false => 0.0,
+    };
+    let stiffness = (given.stiffness)
+        .unwrap_or(((STIFFNESS * heaviest).max(OF_PLATE * films) / (dt * dt)).max(held));
     if stiffness <= 0.0 {
         return Err(Error::input(
             "contact.stiffness",

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// ```
 ///
 /// q + Δt q̇ being where the joint is at the end of the step. With an integrator that takes the velocity from there (`momentum-euler`, `energy-euler`) it is implicit, and stable however stiff; with `midpoint`,
-/// whose q and q̇ are those of the middle, it is so too, and looks half a step beyond the end: of first order, as if c were k Δt larger.
+/// whose q is that of the middle, and q̇ one between the middle's and the end's, the later the stiffer, it is so too, and looks beyond the end: of first order, as if c were k Δt larger.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Servo {

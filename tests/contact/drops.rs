@@ -4,7 +4,7 @@ use super::tools::{above_floor, contact, touching};
 use crate::support::falling::drops;
 use crate::support::{self, check_gradient, run, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Plane, Scene, Shape};
+use hydrograd::scene::{Body, Contact, Fluid, Joint, Plane, Scene, Shape};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 use rayon::prelude::*;
 
@@ -443,4 +443,26 @@ fn balls_that_start_in_one_another_are_told_what_is_so() {
         ],
     );
     assert!(!told.contains("time step"), "{told}");
+}
+
+/// Small heavy bodies set down on the floor rest in the gap that they have by default, at long steps as well.
+#[test]
+fn small_heavy_balls_rest_in_their_gap() {
+    for (radius, dt) in [(0.02, 0.02), (0.008, 0.01), (0.02, 0.01)] {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.gravity = [0.0, 0.0, -9.81];
+        scene.time_step = dt;
+        scene.contact = Some(Contact::default());
+        scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+        let ball = Body::new(Shape::sphere(radius)).density(7800.0);
+        scene.add(ball.at([0.0, 0.0, 1.015 * radius]));
+        let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+        let rollout = simulator.rollout(&Controls::zeros(&simulator, 50)).unwrap();
+        let gap = rollout.gaps()[50].unwrap().distance;
+        println!(
+            "{radius} m, {dt} s: {:.3} of the gap",
+            gap / (0.01 * radius)
+        );
+        assert!(gap > 0.4 * 0.01 * radius && gap < 0.01 * radius, "{gap}");
+    }
 }

@@ -62,6 +62,8 @@ fn flush_stacks_stand() {
                 let body = Body::new(shape.clone()).density(2000.0);
                 scene.add(body.at([0.0, 0.0, 0.00505 + 0.0101 * f64::from(k)]));
             }
+            // So soft that they sink in.
+            contact(&mut scene).stiffness = Some(200.0);
             let rollout = run(&simulator(&scene), 200);
             let last = &rollout.samples()[200];
             for (k, pose) in last.poses.iter().enumerate() {

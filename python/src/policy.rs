@@ -175,12 +175,10 @@ impl Policy for Controller {
     fn with_gains(&self, gains: &[f64]) -> hydrograd::Result<Box<dyn Policy>> {
         asked(|py| {
             let gains = array::to_python(py, gains.to_vec(), &[gains.len()])?;
-            let mut other = Self::new(
-                &with_gains(&self.object(py), gains.as_any())?,
-                (self.controls, self.velocities),
-            )?;
+            let made = with_gains(&self.object(py), gains.as_any())?;
+            let mut other = Self::new(&made, (self.controls, self.velocities))?;
             // Nobody else holds the one that was made just now.
-            other.object = Pointer::Strong(other.object(py).unbind());
+            other.object = Pointer::Strong(made.unbind());
             Ok(Box::new(other) as Box<dyn Policy>)
         })
     }

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! v₀ being the velocity at the step's start: with w = 0 the mean, with w = 1 the velocity at the step's end, by which what is stiff is gone at once (1/(1 + a) a step). In between
-//! nothing changes its sign, (2 + a)/(2 + 4a + …) of it staying, and what a small a changes is of second order in Δt, as the method's own error. a is that of each joint at rest at the start of
-//! a run, by all that the joint moves: a constant of the run, which gradients don't follow.
+//! nothing changes its sign, and what a small a changes is of second order in Δt, as the method's own error. a is that of each joint at rest at the start of
+//! a run, by all that the joint moves, up to the next power of two: a constant of the run, which gradients don't follow, and the same for scenes that differ by little.
 
 use super::force::{ForceModel, LoadBars, Loads, Moving, Velocity};
 use super::{Drive, Evaluation, ForceCotangents, Parameters, System};
@@ -65,7 +65,7 @@ impl System {
         for (k, &i) in free.iter().enumerate().filter(|(_, i)| slowed[**i] > 0.0) {
             let unit = DVector::from_fn(free.len(), |j, _| f64::from(j == k));
             let mobility = factor.solve(&unit).map_or(f64::INFINITY, |x| x[k]);
-            let a = dt * slowed[i] * mobility;
+            let a = (dt * slowed[i] * mobility).log2().ceil().exp2();
             // Without an inertia of its own all of it is late.
             out[i] = if a.is_finite() && a > 0.0 {
                 a / (1.0 + a)

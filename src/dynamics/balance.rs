@@ -123,10 +123,12 @@ impl Evaluation<'_> {
         let at = self.moving(&twists, v, control);
         let mut out = DVector::zeros(v.len());
         for force in self.system.smooth_forces() {
-            let mut loads = Loads::zeros(twists.len(), v.len());
-            force.effort(&at, &mut loads);
-            out +=
-                tree.project(&self.kinematics.columns, loads.wrenches).abs() + loads.joints.abs();
+            force.efforts(&at, &mut |add| {
+                let mut loads = Loads::zeros(twists.len(), v.len());
+                add(&mut loads);
+                let bodies = tree.project(&self.kinematics.columns, loads.wrenches);
+                out += bodies.abs() + loads.joints.abs();
+            });
         }
         out
     }

@@ -142,12 +142,10 @@ impl Evaluation<'_> {
         self.late_loads(&late.velocity, control) - self.late_loads(late.mean, control)
     }
 
-    /// Its derivatives by the mean velocity, and by the one at the step's start: each joint's by its own.
-    pub(super) fn late_rates(&self, late: &Late, control: &DVector<f64>) -> [DVector<f64>; 2] {
+    /// Its derivative by the mean velocity: each joint's by its own.
+    pub(super) fn late_rates(&self, late: &Late, control: &DVector<f64>) -> DVector<f64> {
         let there = self.late_slopes(&late.velocity, control);
-        let by_start = -self.system.late.component_mul(&there);
-        let by_mean = &there - &by_start - self.late_slopes(late.mean, control);
-        [by_mean, by_start]
+        &there + self.system.late.component_mul(&there) - self.late_slopes(late.mean, control)
     }
 
     /// Transpose of [`Evaluation::late_force`]: the gradient of its power on `z`.

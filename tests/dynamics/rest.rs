@@ -78,6 +78,32 @@ fn moored() -> Scene {
     scene
 }
 
+/// Between springs that pull against one another.
+fn strung() -> Scene {
+    let mut scene = water();
+    let ball = Body::new(Shape::sphere(0.1).faces(80)).named("ball");
+    scene.add(ball.density(1000.0).at([0.3, 0.0, 1.0]).drag(Drag {
+        part: DragPart::Total,
+        linear: 200.0,
+        ..Drag::default()
+    }));
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            let along = |from: [f64; 3], length: f64| {
+                let mut out = from;
+                out[axis] += side * length;
+                out
+            };
+            let spring = Spring::new("ball").at(along([0.0; 3], 0.1));
+            let spring = spring.anchored(along([0.3, 0.0, 1.0], 1.37));
+            let spring = spring.stiffness(1500.0).rest_length(0.9);
+            scene.add_force(spring.damping(20.0).into());
+        }
+    }
+    scene.initial.v = vec![0.3, 0.2, -0.1, 0.5, 0.3, 0.1];
+    scene
+}
+
 #[test]
 fn what_comes_to_rest_stays() {
     let passive = |damping| {
@@ -95,6 +121,7 @@ fn what_comes_to_rest_stays() {
         ("damped spring of a joint", passive(200.0)),
         ("spring", sprung()),
         ("moored", moored()),
+        ("strung", strung()),
     ];
     for (name, scene) in scenes {
         let mut rests: Vec<f64> = Vec::new();

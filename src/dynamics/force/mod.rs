@@ -229,6 +229,9 @@ impl Loads {
     }
 }
 
+/// Takes the terms of a force, each as what adds it.
+pub type Terms<'t> = dyn FnMut(&dyn Fn(&mut Loads)) + 't;
+
 /// What a transpose adds to.
 pub struct LoadBars<'a> {
     /// Cotangents of the poses: work on a spatial displacement of each body.
@@ -307,9 +310,10 @@ pub trait ForceModel: Send + Sync {
     /// Adds what it does.
     fn add(&self, at: &Moving, out: &mut Loads);
 
-    /// Adds what [`ForceModel::add`] is rounded by: its terms without their signs, where it is a small difference of large ones.
-    fn effort(&self, at: &Moving, out: &mut Loads) {
-        self.add(at, out);
+    /// Hands what [`ForceModel::add`] is a sum of to `each`, term by term, for the sizes that it is rounded by: what may cancel against one another apart, and the terms of a small difference of
+    /// large ones without their signs.
+    fn efforts(&self, at: &Moving, each: &mut Terms) {
+        each(&|out| self.add(at, out));
     }
 
     /// Adds the tangent of [`ForceModel::add`] along a change of the velocity; nothing where it doesn't depend on it.

@@ -1,6 +1,8 @@
 //! Springs, damping and friction of joints with one coordinate: τ = −k (q − q₀) − c q̇ − τ_f q̇ / √(q̇² + v_f²).
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
+use super::{
+    ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Terms, Together, Velocity,
+};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters, Range};
 
 const STIFFNESS: Declared = Declared::new("joint.stiffness", "N/m or N m/rad");
@@ -80,14 +82,15 @@ impl ForceModel for Passives {
         }
     }
 
-    fn effort(&self, at: &Moving, out: &mut Loads) {
+    fn efforts(&self, at: &Moving, each: &mut Terms) {
         let parameters = at.place.parameters;
         for joint in &self.0 {
             let rate = at.v[joint.v].abs();
             let reach = at.place.q[joint.q].abs() + parameters[joint.rest].abs();
-            out.joints[joint.v] += parameters[joint.stiffness] * reach
+            let effort = parameters[joint.stiffness] * reach
                 + parameters[joint.damping] * rate
                 + parameters[joint.friction];
+            each(&|out| out.joints[joint.v] += effort);
         }
     }
 

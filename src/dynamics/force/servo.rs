@@ -1,6 +1,6 @@
 //! Drives that hold joints at targets, which are their controls: τ = k (u − q − Δt q̇) − c q̇.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
+use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Terms, Together, Velocity};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters};
 
 const STIFFNESS: Declared = Declared::new("servo.stiffness", "N/m or N m/rad");
@@ -70,12 +70,13 @@ impl ForceModel for Servos {
         }
     }
 
-    fn effort(&self, at: &Moving, out: &mut Loads) {
+    fn efforts(&self, at: &Moving, each: &mut Terms) {
         let parameters = at.place.parameters;
         for s in &self.each {
             let reach = at.control[s.control].abs() + at.place.q[s.q].abs();
-            out.joints[s.v] +=
+            let effort =
                 parameters[s.stiffness] * reach + self.slowing(s, parameters) * at.v[s.v].abs();
+            each(&|out| out.joints[s.v] += effort);
         }
     }
 

@@ -3,7 +3,9 @@
 //! With d from the first end to the second, n = d/|d| and u = ḋ, the tension is T = k (|d| − L) + c n·u; T n acts on the first
 //! body, −T n on the second. Where the ends meet there is no direction, and nothing acts; without a rest length the force k d has a slope there all the same.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
+use super::{
+    ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Terms, Together, Velocity,
+};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity, point_wrench};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters};
 use crate::scene::Force;
@@ -142,14 +144,15 @@ impl ForceModel for Springs {
         }
     }
 
-    fn effort(&self, at: &Moving, out: &mut Loads) {
+    fn efforts(&self, at: &Moving, each: &mut Terms) {
         for spring in &self.0 {
             let s = spring.stretched(at);
             let parameters = at.place.parameters;
             let reach = s.ends.iter().map(Vec3::norm).sum::<f64>();
             let held = parameters[spring.stiffness] * (reach + parameters[spring.rest_length]);
             let damped = parameters[spring.damping] * s.velocity.norm();
-            spring.pull(&s.ends, &((held + damped) * s.normal), &mut out.wrenches);
+            let pull = (held + damped) * s.normal;
+            each(&|out| spring.pull(&s.ends, &pull, &mut out.wrenches));
         }
     }
 

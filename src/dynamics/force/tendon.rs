@@ -1,6 +1,8 @@
 //! Tendons over joints at fixed lever arms: T = k (g u − Σ r q) − c Σ r q̇ on each joint by its arm.
 
-use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
+use super::{
+    ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Terms, Together, Velocity,
+};
 use crate::dynamics::parameters::{Declarations, Declared, Owner, Parameter, Parameters, Range};
 use nalgebra::DVector;
 
@@ -66,6 +68,17 @@ impl Tendon {
         self.over.iter().map(|o| o.arm * v[o.v]).sum()
     }
 
+    fn tension(&self, at: &Moving) -> f64 {
+        let parameters = at.place.parameters;
+        parameters[self.stiffness] * self.error(at) - parameters[self.damping] * self.rate(at.v)
+    }
+
+    fn pull(&self, tension: f64, out: &mut Loads) {
+        for o in &self.over {
+            out.joints[o.v] += o.arm * tension;
+        }
+    }
+
     /// What is left to where it is pulled to, m.
     fn error(&self, at: &Moving) -> f64 {
         at.place.parameters[self.gain] * at.control[self.control] - self.length(at.place.q)
@@ -78,13 +91,12 @@ impl ForceModel for Tendons {
     }
 
     fn add(&self, at: &Moving, out: &mut Loads) {
-        let parameters = at.place.parameters;
+        self.0.iter().for_each(|t| t.pull(t.tension(at), out));
+    }
+
+    fn efforts(&self, at: &Moving, each: &mut Terms) {
         for t in &self.0 {
-            let tension =
-                parameters[t.stiffness] * t.error(at) - parameters[t.damping] * t.rate(at.v);
-            for o in &t.over {
-                out.joints[o.v] += o.arm * tension;
-            }
+            each(&|out| t.pull(t.tension(at), out));
         }
     }
 

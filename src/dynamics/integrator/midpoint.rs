@@ -76,6 +76,15 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
             let y = &p + s.dt * next.force;
             return Ok(middle_contact::apply(start, stage, y)?);
         }
+        if moved > 0.5 * previous {
+            // Forces that cancel leave rounding, beside which a small velocity doesn't settle.
+            let m = middle(start, &stage)?;
+            let equation = Equation::new(start, &m, &p, rule(s));
+            let now = equation.at(stage.clone())?;
+            if equation.is_noise(&now) {
+                return Ok(middle_contact::apply(start, now.v, &p + s.dt * now.force)?);
+            }
+        }
         previous = moved;
     }
     Err(Error::Solver {

@@ -48,13 +48,8 @@ impl<'a> AdjointStage<'a> {
         let made = StageMatrix::new(start, e, v, rule)?;
         let matrix = made.matrix(v, reached, rule);
         let factor = made.factored(start.split, &matrix, true);
-        let late = start.late(e, v, rule);
-        let late = late.map(|late| {
-            let [by_mean, _] = e.late_rates(&late, control);
-            by_mean
-        });
         Ok(Self {
-            late,
+            late: made.late,
             v: v.clone(),
             control: control.clone(),
             reached: reached.clone(),

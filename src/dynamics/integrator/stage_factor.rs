@@ -29,6 +29,8 @@ pub(super) struct StageMatrix<'e, 'a> {
     alone: Option<Linearisation<'a>>,
     /// ∂f/∂v, of `alone` where there is one.
     pub rates: IslandMatrix,
+    /// What of its diagonal is of forces that are late, where some are.
+    pub late: Option<DVector<f64>>,
 }
 
 impl<'e, 'a> StageMatrix<'e, 'a> {
@@ -45,11 +47,17 @@ impl<'e, 'a> StageMatrix<'e, 'a> {
         let alone = e.alone()?;
         let control = &start.input.control;
         let mut rates = (alone.as_ref().unwrap_or(e)).force_velocity_blocks(v, control)?;
-        if let Some(late) = start.late(e, v, rule) {
-            let [by_mean, _] = e.late_rates(&late, control);
-            rates.subtract(by_mean.iter().enumerate().map(|(i, x)| (i, i, -x)));
+        let late = start.late(e, v, rule);
+        let late = late.map(|late| e.late_rates(&late, control));
+        if let Some(late) = &late {
+            rates.subtract(late.iter().enumerate().map(|(i, x)| (i, i, -x)));
         }
-        Ok(Self { e, alone, rates })
+        Ok(Self {
+            e,
+            alone,
+            rates,
+            late,
+        })
     }
 
     fn at(&self) -> &Linearisation<'a> {

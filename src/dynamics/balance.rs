@@ -298,21 +298,29 @@ impl Linearisation<'_> {
     /// # Errors
     /// A coupling that fails.
     pub fn force(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<DVector<f64>> {
-        let tree = &self.system.tree;
+        let twists = self.system.tree.twists(&self.kinematics, v);
+        self.force_with(v, &twists, self.loads(&twists, v, control))
+    }
+
+    /// The same with `loads` for all forces but those of the motion itself, at the spatial `twists` of v.
+    pub(super) fn force_with(
+        &self,
+        v: &DVector<f64>,
+        twists: &[Vec6],
+        mut loads: Loads,
+    ) -> Result<DVector<f64>> {
         let rho = self.parameters.density();
-        let twists = tree.twists(&self.kinematics, v);
         let direction = self.through_water(v);
         let fluid = self.fluid_momenta(&direction);
         let pose_force = self.pose_force(&direction)?;
         let current = self.current_twist();
-        let mut loads = self.loads(&twists, v, control);
-        let drifting = self.drifting(&twists);
+        let drifting = self.drifting(twists);
         for (b, rate) in loads.wrenches.iter_mut().enumerate() {
             *rate += rho * (pose_force[b] + cross_force(&current, &fluid[b]));
         }
         self.add_drift(&drifting, &mut loads.wrenches);
         let momenta = self.with_rigid(&drifting, &fluid);
-        let out = self.project_frame(&twists, momenta, loads.wrenches);
+        let out = self.project_frame(twists, momenta, loads.wrenches);
         Ok(out + self.frame_dual(&loads.joints))
     }
 

@@ -29,6 +29,7 @@ mod late;
 mod limit;
 mod linearisation;
 mod momentum;
+mod motion_force;
 mod motions;
 mod parameters;
 mod recoil;

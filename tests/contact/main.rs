@@ -13,6 +13,7 @@ mod pieces;
 mod resistance;
 mod standard;
 mod tools;
+mod wet;
 
 #[path = "../support/mod.rs"]
 mod support;

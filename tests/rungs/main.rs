@@ -224,11 +224,19 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::contact::Problem::solve_vjp",
-        "dynamics::integrator::contact::Adjoint::apply_vjp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+    ),
+    (
+        "dynamics::integrator::contact::Problem::solve_pushed_vjp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::integrator::contact::Problem::pressed_vjp",
-        "dynamics::integrator::contact::Adjoint::apply_vjp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+    ),
+    (
+        "dynamics::motion_force::Linearisation::motion_force_vjp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::late::Evaluation::late_force_vjp",
@@ -338,15 +346,15 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::contact::Problem::solve_jvp",
-        "dynamics::integrator::contact::Adjoint::apply_jvp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_jvp",
+    ),
+    (
+        "dynamics::integrator::contact::Problem::solve_pushed_jvp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_jvp",
     ),
     (
         "dynamics::integrator::contact::Problem::pressed_jvp",
-        "dynamics::integrator::contact::Adjoint::apply_jvp",
-    ),
-    (
-        "dynamics::integrator::contact::Adjoint::velocity_jvp",
-        "dynamics::integrator::contact::Adjoint::apply_jvp",
+        "dynamics::integrator::wet_contact::Adjoint::apply_jvp",
     ),
     (
         "dynamics::integrator::record::Part::jvp",

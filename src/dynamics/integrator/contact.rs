@@ -14,7 +14,7 @@ use super::hessian::Hessian;
 use super::split::share;
 use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
-use super::{State, StateBar, StateTangents, StepBar, StepTangents};
+use super::{State, StepBar, StepTangents};
 use crate::dynamics::Dual;
 use crate::dynamics::slopes::columns;
 use crate::dynamics::tied::Places;
@@ -62,6 +62,16 @@ struct Step {
 
 /// The velocity after contact that acts for `dt` (s), from the one before it; the same bits where nothing presses.
 pub(super) fn solve(start: &Start, before: &DVector<f64>, dt: f64) -> Result<DVector<f64>> {
+    solve_pushed(start, before, &DVector::zeros(before.len()), dt)
+}
+
+/// The same with an impulse `push` beside contact, user coordinates, which does nothing where nothing presses.
+pub(super) fn solve_pushed(
+    start: &Start,
+    before: &DVector<f64>,
+    push: &DVector<f64>,
+    dt: f64,
+) -> Result<DVector<f64>> {
     let (e, split) = (start.near, start.split);
     e.check_damping()?;
     // At no force v* is the least of the convex problem.
@@ -70,13 +80,13 @@ pub(super) fn solve(start: &Start, before: &DVector<f64>, dt: f64) -> Result<DVe
     }
     let sized = split.sizes(&e.mass_blocks().diagonal());
     let summands = e.mass_blocks().mapped(DMatrix::abs);
-    let least = sized(&summands.times(&before.abs()));
+    let least = sized(&summands.times(&before.abs())).max(sized(push));
     // Solved by products, steps are as fine as they have to be, beside what earlier ones lack.
     let by_products = e.scattered().is_some();
     let in_water = Cell::new(0.0);
     let at = |v: DVector<f64>, moved: Option<DVector<f64>>, behind: Vec<f64>| {
         let moved = moved.unwrap_or_else(|| e.mass_times(&(&v - before)));
-        let imbalance = &moved - dt * e.contact_force(&v, Dual::User);
+        let imbalance = &moved - push - dt * e.contact_force(&v, Dual::User);
         let size = sized(&summands.times(&v.abs())).max(least);
         let size = size.max(dt * sized(&e.contact_effort(&v)));
         let lacking = share(
@@ -209,12 +219,6 @@ pub(super) fn pressed(
     hat + drift.carry(dt, dt * start.near.contact_force(after, Dual::Frame))
 }
 
-/// What the derivatives of [`apply`] need.
-pub(super) struct Adjoint<'s, 'a> {
-    pub velocities: &'s ContactVelocities,
-    pub problem: Problem<'a>,
-}
-
 /// A problem of contact that has been solved: what the derivatives of [`solve`] and [`pressed`] need.
 pub(super) struct Problem<'a> {
     before: DVector<f64>,
@@ -264,6 +268,18 @@ impl<'a> Problem<'a> {
         along: &StepTangents,
         before: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>> {
+        let none = DMatrix::zeros(before.nrows(), before.ncols());
+        self.solve_pushed_jvp(start, along, before, &none)
+    }
+
+    /// The same of [`solve_pushed`], with those of the impulse.
+    pub fn solve_pushed_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+        push: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>> {
         let Acting::Solved(hessian) = &self.acting else {
             return Ok(before.clone());
         };
@@ -272,7 +288,7 @@ impl<'a> Problem<'a> {
         let pressed = near.contact_force_slopes(&self.after, Dual::User, &split.free);
         let inertia = e.mass_slopes(&change, &split.free, along.inputs.has_parameters())?;
         let moved = columns(before, |v| e.mass_times(v));
-        let right = moved + self.time * pressed.along(along.q, None, along.inputs)
+        let right = moved + push + self.time * pressed.along(along.q, None, along.inputs)
             - inertia.along(along.q, None, along.inputs);
         let mut after = before.clone();
         let free = hessian.solve_columns(&split.take_rows(&right));
@@ -291,8 +307,18 @@ impl<'a> Problem<'a> {
         after_bar: &DVector<f64>,
         bar: &mut StepBar,
     ) -> Result<DVector<f64>> {
+        Ok(self.solve_pushed_vjp(start, after_bar, bar)?.0)
+    }
+
+    /// The same of [`solve_pushed`], with that of the impulse.
+    pub fn solve_pushed_vjp(
+        &self,
+        start: &Start,
+        after_bar: &DVector<f64>,
+        bar: &mut StepBar,
+    ) -> Result<(DVector<f64>, DVector<f64>)> {
         let Acting::Solved(hessian) = &self.acting else {
-            return Ok(after_bar.clone());
+            return Ok((after_bar.clone(), DVector::zeros(after_bar.len())));
         };
         let (e, near, split) = (start.e, start.near, start.split);
         let w = split.put(&hessian.solve(&split.take(after_bar)));
@@ -307,7 +333,7 @@ impl<'a> Problem<'a> {
         for &i in &split.free {
             before_bar[i] = moved[i];
         }
-        Ok(before_bar)
+        Ok((before_bar, w))
     }
 
     /// Tangents of [`pressed`], from those of the velocity after contact and of the momenta before it.
@@ -343,67 +369,5 @@ impl<'a> Problem<'a> {
         let pressed = (start.near).contact_force_vjp(&self.after, &impulse_bar, Dual::Frame);
         bar.add(dt, &pressed);
         dt * pressed.v
-    }
-}
-
-impl<'s, 'a> Adjoint<'s, 'a> {
-    /// At a step's velocities before and after contact.
-    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
-        let ContactVelocities { before, after, .. } = velocities;
-        Ok(Self {
-            velocities,
-            problem: Problem::new(start, before, after, start.stepper.dt)?,
-        })
-    }
-
-    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity after it.
-    pub fn apply_jvp(
-        &self,
-        start: &Start,
-        along: &StepTangents,
-        before: &DMatrix<f64>,
-        hat: DMatrix<f64>,
-    ) -> Result<(StateTangents, DMatrix<f64>)> {
-        let after = self.problem.solve_jvp(start, along, before)?;
-        let hat = self.problem.pressed_jvp(start, along, &after, hat);
-        let next = StateTangents {
-            q: start.advance_jvp(&self.velocities.after, along.q, &after),
-            y: start.next_momenta(hat),
-        };
-        Ok((next, after))
-    }
-
-    /// Tangents of the velocity after contact alone, for integrators that carry it.
-    pub fn velocity_jvp(
-        &self,
-        start: &Start,
-        along: &StepTangents,
-        before: &DMatrix<f64>,
-    ) -> Result<StateTangents> {
-        let after = self.problem.solve_jvp(start, along, before)?;
-        Ok(StateTangents {
-            q: start.advance_jvp(&self.velocities.after, along.q, &after),
-            y: after,
-        })
-    }
-
-    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, with that of the velocity after it from elsewhere; the rest is added
-    /// to `bar`.
-    pub fn apply_vjp(
-        &self,
-        start: &Start,
-        next_bar: &StateBar,
-        own: Option<&DVector<f64>>,
-        bar: &mut StepBar,
-    ) -> Result<(DVector<f64>, DVector<f64>)> {
-        let (q_bar, mut after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
-        bar.state.q += q_bar;
-        if let Some(own) = own {
-            after_bar += own;
-        }
-        let hat_bar = start.next_momentum_bar(next_bar);
-        after_bar += self.problem.pressed_vjp(start, &hat_bar, bar);
-        let before_bar = self.problem.solve_vjp(start, &after_bar, bar)?;
-        Ok((before_bar, hat_bar))
     }
 }

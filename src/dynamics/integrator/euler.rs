@@ -21,6 +21,7 @@ use super::stage_adjoint::AdjointStage;
 use super::stage_factor::{StageFactor, StageMatrix};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
+use super::wet_contact;
 use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
 use crate::dynamics::Linearisation;
@@ -250,16 +251,22 @@ fn rule(s: &Stepper) -> Rule {
 }
 
 pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
+    let (v, hat) = free(start)?;
+    Ok(wet_contact::apply(start, v, hat)?)
+}
+
+/// The velocity and the frame momenta with which a step ends without contact.
+fn free(start: &Start) -> std::result::Result<(DVector<f64>, DVector<f64>), Halt> {
     let (s, e) = (start.stepper, start.e);
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
-    let y = &p + s.dt * &stage.force;
-    Ok(contact::apply(start, stage.v, y)?)
+    Ok((stage.v, p + s.dt * stage.force))
 }
 
-/// The same, whose energy is closed.
+/// A step whose energy is closed.
 pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
-    let (next, stages) = step(start)?;
+    let (v, hat) = free(start)?;
+    let (next, stages) = contact::apply(start, v, hat)?;
     match &stages {
         Stages::Contact(velocities) => Ok((energy::close(start, velocities, next)?, stages)),
         Stages::RungeKutta(_) => Ok((next, stages)),
@@ -268,7 +275,7 @@ pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages),
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: contact::Adjoint<'s, 'a>,
+    contact: wet_contact::Adjoint<'s, 'a>,
     /// p̂ + Δt f.
     reached: DVector<f64>,
     stage: AdjointStage<'a>,
@@ -291,7 +298,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         Ok(Self {
             closure,
             stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
-            contact: contact::Adjoint::new(start, velocities)?,
+            contact: wet_contact::Adjoint::new(start, velocities)?,
             reached,
         })
     }

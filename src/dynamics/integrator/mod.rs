@@ -37,6 +37,7 @@ mod stage_matrix;
 mod stages;
 mod start;
 mod velocity_euler;
+mod wet_contact;
 
 pub use plan::Stops;
 pub use record::{LinearisedStep, StepRecord};

@@ -44,7 +44,8 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: contact::Adjoint<'s, 'a>,
+    velocities: &'s ContactVelocities,
+    problem: contact::Problem<'a>,
     acceleration: DVector<f64>,
     /// Of the mass matrix of free velocities.
     factor: Inertia<'a>,
@@ -54,7 +55,13 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let (acceleration, factor) = acceleration(start)?;
         Ok(Self {
-            contact: contact::Adjoint::new(start, velocities)?,
+            problem: contact::Problem::new(
+                start,
+                &velocities.before,
+                &velocities.after,
+                start.stepper.dt,
+            )?,
+            velocities,
             acceleration,
             factor,
         })
@@ -79,20 +86,21 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         split.forget_driven_rows(&mut before);
         before += s.dt * self.factor.solve_columns(&right);
         e.check()?;
-        self.contact.velocity_jvp(start, along, &before)
+        let after = self.problem.solve_jvp(start, along, &before)?;
+        Ok(StateTangents {
+            q: start.advance_jvp(&self.velocities.after, along.q, &after),
+            y: after,
+        })
     }
 
     fn vjp(&self, start: &Start<'_, 'a>, next_bar: &StateBar) -> Result<StepBar> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let mut bar = StepBar::zeros(e);
-        let after = &self.contact.velocities.after;
+        let after = &self.velocities.after;
         let (q_bar, mut after_bar) = start.advance_vjp(after, &next_bar.q);
         bar.state.q += q_bar;
         after_bar += &next_bar.y;
-        let mut v_bar = self
-            .contact
-            .problem
-            .solve_vjp(start, &after_bar, &mut bar)?;
+        let mut v_bar = self.problem.solve_vjp(start, &after_bar, &mut bar)?;
         split.forget_driven(&mut v_bar);
         bar.v += &v_bar;
         // Free rows of M a = G − M_fd a_d, a_d = (v_d − v)/Δt, v_d at the step's end.

@@ -59,7 +59,7 @@ fn what_rests_presses_by_its_weight() {
             let (share, v) = (pressed(&rollout, weight), rollout.samples()[steps].v.amax());
             println!("{name}, {dt} s: presses by {share:.6} of its weight, reads {v:.1e}");
             assert!((share - 1.0).abs() < 2e-3, "{name}, {dt}: {share}");
-            assert!(v < 1e-4, "{name}, {dt}: {v}");
+            assert!(v < 2e-2 * GRAVITY * dt, "{name}, {dt}: {v}");
         }
     }
 }
@@ -91,7 +91,7 @@ fn gradients_are_those_of_the_steps() {
     let mut scene = floor(0.01, 0.3);
     for (x, y) in [(0.0, 0.0), (0.23, 0.05)] {
         let ball = Body::new(Shape::sphere(0.1).faces(80)).density(1500.0);
-        scene.add(ball.at([x, y, 0.1]));
+        scene.add(ball.at([x, y, 0.1005]));
     }
     scene.initial.v = vec![
         0.4, 0.1, -0.1, 0.0, 0.5, 0.0, 0.0, 0.05, -0.05, 0.2, 0.0, 0.1,

@@ -85,6 +85,11 @@ impl Drift {
         self.twists.iter().all(|w| *w == Vec6::zeros())
     }
 
+    /// Whether D isn't zero.
+    pub fn turns(&self) -> bool {
+        !self.turning.is_empty()
+    }
+
     /// (1 + τ D) p̂: frame momenta about a point at rest, from those about one that has drifted from it for the time τ.
     pub fn carry(&self, time: f64, mut p: DVector<f64>) -> DVector<f64> {
         for (v, d) in &self.turning {

@@ -1,4 +1,4 @@
-//! What rests in water that bodies feel each other through: it doesn't move, and so the water does nothing to it.
+//! What rests doesn't move, and so no force of its motion is on it: the water's, or its links' own.
 
 use crate::support::{check_gradient, run};
 use hydrograd::dynamics::Integrator;
@@ -22,9 +22,15 @@ fn floor(dt: f64, friction: f64) -> Scene {
     scene
 }
 
-fn simulator(scene: &Scene) -> Simulator {
-    let settings = Settings::default().fidelity(Fidelity::Reduced);
-    Simulator::new(scene, settings.integrator(Integrator::MomentumEuler)).unwrap()
+const INTEGRATORS: [Integrator; 3] = [
+    Integrator::MomentumEuler,
+    Integrator::EnergyEuler,
+    Integrator::Midpoint,
+];
+
+fn simulator(scene: &Scene, fidelity: Fidelity, integrator: Integrator) -> Simulator {
+    let settings = Settings::default().fidelity(fidelity);
+    Simulator::new(scene, settings.integrator(integrator)).unwrap()
 }
 
 /// What the floor presses in the last step, over the weight in the water.
@@ -35,6 +41,14 @@ fn pressed(rollout: &Rollout, weight: f64) -> f64 {
 
 #[test]
 fn what_rests_presses_by_its_weight() {
+    for integrator in INTEGRATORS {
+        for fidelity in [Fidelity::Reduced, Fidelity::Isolated] {
+            presses_by_its_weight(fidelity, integrator);
+        }
+    }
+}
+
+fn presses_by_its_weight(fidelity: Fidelity, integrator: Integrator) {
     for (name, shape, height, density) in [
         ("ball", Shape::sphere(0.1), 0.101, 3000.0),
         ("small ball", Shape::sphere(0.02), 0.0203, 7800.0),
@@ -52,14 +66,23 @@ fn what_rests_presses_by_its_weight() {
                     .density(density)
                     .at([0.0, 0.0, height]),
             );
-            let simulator = simulator(&scene);
+            let simulator = simulator(&scene, fidelity, integrator);
             let rollout = run(&simulator, steps);
             let volume = simulator.parameters().volume(0);
             let weight = (density - 1000.0) * volume * GRAVITY;
             let (share, v) = (pressed(&rollout, weight), rollout.samples()[steps].v.amax());
-            println!("{name}, {dt} s: presses by {share:.6} of its weight, reads {v:.1e}");
-            assert!((share - 1.0).abs() < 2e-3, "{name}, {dt}: {share}");
-            assert!(v < 2e-2 * GRAVITY * dt, "{name}, {dt}: {v}");
+            println!(
+                "{name}, {fidelity:?}, {integrator:?}, {dt} s: presses by {share:.6} of its weight, reads {v:.1e}"
+            );
+            let at = format!("{name}, {fidelity:?}, {integrator:?}, {dt}");
+            // Energy Euler closes the energy of what the bodies' water still does.
+            let bound = if integrator == Integrator::EnergyEuler {
+                4e-3
+            } else {
+                1e-3
+            };
+            assert!((share - 1.0).abs() < bound, "{at}: {share}");
+            assert!(v < 2e-2 * GRAVITY * dt, "{at}: {v}");
         }
     }
 }
@@ -67,6 +90,12 @@ fn what_rests_presses_by_its_weight() {
 /// Two balls at rest side by side on a floor without friction stay where they are.
 #[test]
 fn what_rests_side_by_side_stays() {
+    for integrator in INTEGRATORS {
+        side_by_side(integrator);
+    }
+}
+
+fn side_by_side(integrator: Integrator) {
     for dt in [0.02, 0.01, 0.005] {
         let mut scene = floor(dt, 0.0);
         for x in [0.0, 0.205] {
@@ -74,14 +103,14 @@ fn what_rests_side_by_side_stays() {
             scene.add(ball.at([x, 0.0, 0.101]));
         }
         let steps = (0.6 / dt).round() as usize;
-        let rollout = run(&simulator(&scene), steps);
+        let rollout = run(&simulator(&scene, Fidelity::Reduced, integrator), steps);
         let along = |k: usize| [0, 6].map(|i| rollout.samples()[k].v[i].abs());
         let found = along(steps).into_iter().fold(0.0, f64::max);
         println!(
-            "{dt} s: {found:.1e} m/s after 0.6 s, {:.1e} after 0.3",
+            "{integrator:?}, {dt} s: {found:.1e} m/s after 0.6 s, {:.1e} after 0.3",
             along(steps / 2)[0]
         );
-        assert!(found < 2e-4, "{dt}: {found}");
+        assert!(found < 2e-4, "{integrator:?}, {dt}: {found}");
     }
 }
 
@@ -96,8 +125,15 @@ fn gradients_are_those_of_the_steps() {
     scene.initial.v = vec![
         0.4, 0.1, -0.1, 0.0, 0.5, 0.0, 0.0, 0.05, -0.05, 0.2, 0.0, 0.1,
     ];
-    let mut simulator = simulator(&scene);
-    let rollout = run(&simulator, 8);
-    assert!((0..8).all(|n| !rollout.contacts(n, 0.0).unwrap().is_empty()));
-    check_gradient("two balls on a floor", &mut simulator, 8, 3, 1e-6);
+    for integrator in INTEGRATORS {
+        for fidelity in [Fidelity::Reduced, Fidelity::Isolated] {
+            let mut simulator = simulator(&scene, fidelity, integrator);
+            let rollout = run(&simulator, 8);
+            let presses = |n: &usize| !rollout.contacts(*n, 0.0).unwrap().is_empty();
+            let pressed = (0..8).filter(presses).count();
+            assert!(pressed >= 6, "{fidelity:?}, {integrator:?}: {pressed}");
+            let name = format!("two balls on a floor, {fidelity:?}, {integrator:?}");
+            check_gradient(&name, &mut simulator, 8, 3, 1e-6);
+        }
+    }
 }

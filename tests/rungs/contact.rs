@@ -39,7 +39,7 @@ pub fn rungs() -> Vec<Rung> {
             check: force_vjp,
         },
         Rung {
-            name: "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+            name: "dynamics::integrator::end_contact::Adjoint::apply_vjp",
             check: |c| all(INTEGRATORS.map(|i| step_vjp(i, c))),
         },
         Rung {

@@ -34,7 +34,7 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::runge_kutta::Adjoint::jvp" =>
             |c| both(Integrator::Rk4, c).worst(both(Integrator::Rk2, c)),
         "dynamics::integrator::velocity_euler::Adjoint::jvp" => |c| both(Integrator::VelocityEuler, c),
-        "dynamics::integrator::wet_contact::Adjoint::apply_jvp" =>
+        "dynamics::integrator::end_contact::Adjoint::apply_jvp" =>
             |c| all(contact::INTEGRATORS.map(|i| pressed(i, c))),
         "dynamics::integrator::middle_contact::Adjoint::apply_jvp" => |c| pressed(Integrator::Midpoint, c),
         "simulate::tangents::Rollout::jvp" => |c| all(INTEGRATORS.map(|i| rollout(i, &["positions", "rotations"], c))),

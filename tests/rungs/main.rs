@@ -224,19 +224,23 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::contact::Problem::solve_vjp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+        "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::integrator::contact::Problem::solve_pushed_vjp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+        "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::integrator::contact::Problem::pressed_vjp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+        "dynamics::integrator::end_contact::Adjoint::apply_vjp",
+    ),
+    (
+        "dynamics::integrator::motion_push::MotionPush::push_vjp",
+        "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::motion_force::Linearisation::motion_force_vjp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_vjp",
+        "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
     (
         "dynamics::late::Evaluation::late_force_vjp",
@@ -346,15 +350,19 @@ const THROUGH: &[(&str, &str)] = &[
     ),
     (
         "dynamics::integrator::contact::Problem::solve_jvp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_jvp",
+        "dynamics::integrator::end_contact::Adjoint::apply_jvp",
+    ),
+    (
+        "dynamics::integrator::motion_push::MotionPush::push_jvp",
+        "dynamics::integrator::end_contact::Adjoint::apply_jvp",
     ),
     (
         "dynamics::integrator::contact::Problem::solve_pushed_jvp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_jvp",
+        "dynamics::integrator::end_contact::Adjoint::apply_jvp",
     ),
     (
         "dynamics::integrator::contact::Problem::pressed_jvp",
-        "dynamics::integrator::wet_contact::Adjoint::apply_jvp",
+        "dynamics::integrator::end_contact::Adjoint::apply_jvp",
     ),
     (
         "dynamics::integrator::record::Part::jvp",

@@ -12,9 +12,8 @@
 
 use super::hessian::Hessian;
 use super::split::share;
-use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
-use super::{State, StepBar, StepTangents};
+use super::{StepBar, StepTangents};
 use crate::dynamics::Dual;
 use crate::dynamics::slopes::columns;
 use crate::dynamics::tied::Places;
@@ -62,20 +61,24 @@ struct Step {
 
 /// The velocity after contact that acts for `dt` (s), from the one before it; the same bits where nothing presses.
 pub(super) fn solve(start: &Start, before: &DVector<f64>, dt: f64) -> Result<DVector<f64>> {
-    solve_pushed(start, before, &DVector::zeros(before.len()), dt)
+    match start.near.contact_acts(before) {
+        true => solve_pushed(start, before, &DVector::zeros(before.len()), dt, before),
+        // At no force v* is the least of the convex problem.
+        false => start.near.check_damping().map(|()| before.clone()),
+    }
 }
 
-/// The same with an impulse `push` beside contact, user coordinates, which does nothing where nothing presses.
+/// The same with an impulse `push` beside contact, user coordinates, from a first guess.
 pub(super) fn solve_pushed(
     start: &Start,
     before: &DVector<f64>,
     push: &DVector<f64>,
     dt: f64,
+    guess: &DVector<f64>,
 ) -> Result<DVector<f64>> {
     let (e, split) = (start.near, start.split);
     e.check_damping()?;
-    // At no force v* is the least of the convex problem.
-    if split.free.is_empty() || !e.contact_acts(before) {
+    if split.free.is_empty() {
         return Ok(before.clone());
     }
     let sized = split.sizes(&e.mass_blocks().diagonal());
@@ -104,7 +107,7 @@ pub(super) fn solve_pushed(
             residual: if lacks { lacking } else { own },
         }
     };
-    let mut now = at(before.clone(), None, Vec::new());
+    let mut now = at(guess.clone(), None, Vec::new());
     let (mut previous, mut places) = (f64::INFINITY, Places::default());
     for iteration in 0..ITERATIONS {
         let stalled = now.residual >= 0.25 * previous;
@@ -185,33 +188,9 @@ fn search(
     best
 }
 
-/// The end of a step from the velocity and the frame momenta before contact: the state there, and both velocities.
-pub(super) fn apply(
-    start: &Start,
-    before: DVector<f64>,
-    hat: DVector<f64>,
-) -> Result<(State, Stages)> {
-    let after = solve(start, &before, start.stepper.dt)?;
-    let velocities = ContactVelocities::new(before, after);
-    let next = reached(start, &velocities, hat);
-    Ok((next, Stages::Contact(velocities)))
-}
-
-/// The state at the end, once contact is solved.
-pub(super) fn reached(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
-    let ContactVelocities { before, after, .. } = velocities;
-    let hat = pressed(start, before, after, hat);
-    start.next_state(start.advance(after), hat)
-}
-
-/// The frame momenta `hat` with what contact adds in a step, from the velocities before and after it.
-pub(super) fn pressed(
-    start: &Start,
-    before: &DVector<f64>,
-    after: &DVector<f64>,
-    hat: DVector<f64>,
-) -> DVector<f64> {
-    if !start.near.contact_acts(before) {
+/// The frame momenta `hat` with what contact adds in a step, from the velocity after it.
+pub(super) fn pressed(start: &Start, after: &DVector<f64>, hat: DVector<f64>) -> DVector<f64> {
+    if !start.near.contact_acts(after) {
         return hat;
     }
     // Where the momenta are taken drifts on during the step.
@@ -245,10 +224,26 @@ impl<'a> Problem<'a> {
         after: &DVector<f64>,
         time: f64,
     ) -> Result<Self> {
+        match start.near.contact_acts(before) {
+            true => Self::pushed(start, before, after, time),
+            false => Ok(Self {
+                before: before.clone(),
+                after: after.clone(),
+                time,
+                acting: Acting::No,
+            }),
+        }
+    }
+
+    /// The same beside an impulse.
+    pub fn pushed(
+        start: &Start<'_, 'a>,
+        before: &DVector<f64>,
+        after: &DVector<f64>,
+        time: f64,
+    ) -> Result<Self> {
         let (e, split) = (start.near, start.split);
-        let acting = if !e.contact_acts(before) {
-            Acting::No
-        } else if split.free.is_empty() {
+        let acting = if split.free.is_empty() {
             Acting::Driven
         } else {
             Acting::Solved(Hessian::new(e, split, after, time, &mut Places::default())?)

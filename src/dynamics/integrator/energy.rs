@@ -1,10 +1,10 @@
 //! The end of a step brought to the kinetic energy that it should have: that at its start, and the work of the forces.
 //!
 //! Between two configurations the inertia changes, and what a step of first order makes of that gains or loses energy. With the state (q⁺, p̂*) that the
-//! step ends in, v* = M(q⁺)⁻¹ p*, and the velocities v₀ at its start, v before and v_s after contact, the defect is
+//! step ends in, v* = M(q⁺)⁻¹ p*, and the velocities v₀ at its start, v before contact and v_e with which it acts, the defect is
 //!
 //! ```text
-//! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v*) − ½ Δt g(q, v_s)ᵀ (v + v_s)
+//! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v*) − ½ Δt g(q, v_e)ᵀ (v + v_e)
 //! ```
 //!
 //! F being all forces but the water's inertia, g those of contact; all velocities relative to the drift where there is a current ([`crate::dynamics::Drift`]). It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
@@ -17,7 +17,7 @@
 //!
 //! A motion of B that would move a joint that is held isn't one of all bodies together, and isn't among them.
 //!
-//! c is the identity up to ¼ and bounded by ½. φ = 10⁻⁴ |v|²_M / (10⁻⁴ |v|²_M + |v_s − v|²_M) fades out where contact takes speed: an impact loses more than this accounts for.
+//! c is the identity up to ¼ and bounded by ½. φ = 10⁻⁴ |v|²_M / (10⁻⁴ |v|²_M + |v_e − v|²_M) fades out where contact takes speed: an impact loses more than this accounts for.
 //!
 //! This is a projection on the energy (Hairer, Lubich, Wanner, "Geometric Numerical Integration", IV.4) in the one direction that keeps momenta.
 
@@ -66,7 +66,7 @@ fn common(start: &Start) -> Option<Motions> {
 struct Drifting {
     start: DVector<f64>,
     before: DVector<f64>,
-    after: DVector<f64>,
+    acting: DVector<f64>,
 }
 
 impl Drifting {
@@ -75,7 +75,7 @@ impl Drifting {
         Self {
             start: start.v - w,
             before: &velocities.before - w,
-            after: &velocities.after - w,
+            acting: velocities.acting() - w,
         }
     }
 }
@@ -117,7 +117,7 @@ impl Parts {
     ) -> Result<Option<Self>> {
         let (s, e, near, split) = (start.stepper, start.e, start.near, start.split);
         let drifting = Drifting::new(start, velocities);
-        let (before, after) = (&drifting.before, &drifting.after);
+        let (before, acting) = (&drifting.before, &drifting.acting);
         let v = readout::solve(end, split, hat)? - s.system.drift.velocity();
         let (mut together, mut common, mut direction) =
             (DVector::zeros(v.len()), None, hat.clone());
@@ -150,12 +150,12 @@ impl Parts {
         let mut defect = kinetic - e.mass_energy(first) - 0.5 * s.dt * loads.dot(&(first + &v));
         let contact = near
             .contact_acts(&velocities.before)
-            .then(|| near.contact_force(&velocities.after, Dual::User));
+            .then(|| near.contact_force(velocities.acting(), Dual::User));
         let speed = e.mass_energy(before);
         let mut lost = 0.0;
         if let Some(g) = &contact {
-            defect -= 0.5 * s.dt * g.dot(&(before + after));
-            lost = e.mass_energy(&(after - before)).max(0.0);
+            defect -= 0.5 * s.dt * g.dot(&(before + acting));
+            lost = e.mass_energy(&(acting - before)).max(0.0);
         }
         Ok(Some(Self {
             v,
@@ -215,7 +215,7 @@ pub(super) struct Closure<'a> {
 pub(super) struct ClosureBar {
     /// Of the state before the correction.
     pub next: StateBar,
-    /// Of the velocities before and after contact.
+    /// Of the velocity before contact, and of the one with which it acts.
     pub velocities: [DVector<f64>; 2],
 }
 
@@ -241,7 +241,7 @@ impl<'a> Closure<'a> {
         }))
     }
 
-    /// Tangents of the momenta that [`close`] ends with, from those of the state before it and of the velocities before and after contact: its
+    /// Tangents of the momenta that [`close`] ends with, from those of the state before it, of the velocity before contact and of the one with which it acts: its
     /// entries' transposes, which are as many as there are velocities.
     pub fn jvp(
         &self,
@@ -249,19 +249,19 @@ impl<'a> Closure<'a> {
         velocities: &ContactVelocities,
         along: &StepTangents,
         next: &StateTangents,
-        [before, after]: [&DMatrix<f64>; 2],
+        [before, acting]: [&DMatrix<f64>; 2],
     ) -> Result<DMatrix<f64>> {
         let nv = start.v.len();
         let row = |i: &usize| {
             let mut bar = StepBar::zeros(start.e);
             let entry = StateBar::unit(nv, nv + i);
             let own = self.vjp(start, velocities, &entry, &mut bar)?;
-            let [before_bar, after_bar] = &own.velocities;
+            let [before_bar, acting_bar] = &own.velocities;
             Ok(bar.along(along)
                 + next.q.tr_mul(&own.next.q)
                 + next.y.tr_mul(&own.next.y)
                 + before.tr_mul(before_bar)
-                + after.tr_mul(after_bar))
+                + acting.tr_mul(acting_bar))
         };
         let free = &start.split.free;
         // What answers are known when another is asked for is the same for any number of threads.
@@ -286,7 +286,7 @@ impl<'a> Closure<'a> {
     ) -> Result<ClosureBar> {
         let (s, e, near, parts) = (start.stepper, start.e, start.near, &self.parts);
         let drifting = Drifting::new(start, velocities);
-        let (first, before, after) = (&drifting.start, &drifting.before, &drifting.after);
+        let (first, before, acting) = (&drifting.start, &drifting.before, &drifting.acting);
         let end = &self.end;
         let nv = before.len();
         let mut out = ClosureBar {
@@ -350,13 +350,13 @@ impl<'a> Closure<'a> {
         bar.v -= defect_bar * e.mass_times(first);
         bar.add(-0.5 * defect_bar, &e.mass_vjp(first, first)?);
         if let Some(g) = &parts.contact {
-            let along = half * (before + after);
-            let work = near.contact_force_vjp(&velocities.after, &along, Dual::User);
+            let along = half * (before + acting);
+            let work = near.contact_force_vjp(velocities.acting(), &along, Dual::User);
             bar.add(-defect_bar, &work);
             out.velocities[0] -= defect_bar * half * g;
             out.velocities[1] -= defect_bar * (half * g + &work.v);
             if parts.lost > 0.0 {
-                let lost = after - before;
+                let lost = acting - before;
                 // Of both energies; finite where nothing moved before.
                 let sum = FADE * parts.before + parts.lost;
                 let lost_bar = -FADE * parts.before / (sum * sum) * fade_bar;

@@ -11,7 +11,7 @@
 //! The stage is solved by Newton's method with exact derivatives, safeguarded; its adjoint is the implicit function theorem at
 //! the converged stage, with the transpose of the same matrix.
 
-use super::contact;
+use super::end_contact;
 use super::energy::{self, Closure};
 use super::plan::Halt;
 use super::quasi::{self, Trial};
@@ -21,7 +21,6 @@ use super::stage_adjoint::AdjointStage;
 use super::stage_factor::{StageFactor, StageMatrix};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
-use super::wet_contact;
 use super::{Integrator, State, StateBar, StateTangents, StepBar, StepTangents, Stepper};
 use crate::adjoint::lie::angular;
 use crate::dynamics::Linearisation;
@@ -251,22 +250,16 @@ fn rule(s: &Stepper) -> Rule {
 }
 
 pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
-    let (v, hat) = free(start)?;
-    Ok(wet_contact::apply(start, v, hat)?)
-}
-
-/// The velocity and the frame momenta with which a step ends without contact.
-fn free(start: &Start) -> std::result::Result<(DVector<f64>, DVector<f64>), Halt> {
     let (s, e) = (start.stepper, start.e);
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
-    Ok((stage.v, p + s.dt * stage.force))
+    let y = &p + s.dt * &stage.force;
+    Ok(end_contact::apply(start, stage.v, y)?)
 }
 
-/// A step whose energy is closed.
+/// The same, whose energy is closed.
 pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
-    let (v, hat) = free(start)?;
-    let (next, stages) = contact::apply(start, v, hat)?;
+    let (next, stages) = step(start)?;
     match &stages {
         Stages::Contact(velocities) => Ok((energy::close(start, velocities, next)?, stages)),
         Stages::RungeKutta(_) => Ok((next, stages)),
@@ -275,7 +268,7 @@ pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages),
 
 /// What the derivatives of a step need.
 pub(super) struct Adjoint<'s, 'a> {
-    contact: wet_contact::Adjoint<'s, 'a>,
+    contact: end_contact::Adjoint<'s, 'a>,
     /// p̂ + Δt f.
     reached: DVector<f64>,
     stage: AdjointStage<'a>,
@@ -288,9 +281,10 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         let control = &start.input.control;
         let force = e.force(&velocities.before, control)?;
         let reached = start.momentum() + s.dt * force;
+        let contact = end_contact::Adjoint::new(start, velocities)?;
         let closure = match s.integrator {
             Integrator::EnergyEuler => {
-                let next = contact::reached(start, velocities, reached.clone());
+                let next = contact.reached(start, reached.clone());
                 Closure::new(start, velocities, &next)?
             }
             _ => None,
@@ -298,7 +292,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         Ok(Self {
             closure,
             stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
-            contact: wet_contact::Adjoint::new(start, velocities)?,
+            contact,
             reached,
         })
     }
@@ -323,10 +317,10 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let right = by_q.dense() * q + by_hat.dense() * &held - momentum.along(q, None, inputs);
         let v = self.stage.solve_jvp(e, split, &right)?;
         let hat = held + s.dt * (force.v * &v);
-        let (mut next, after) = self.contact.apply_jvp(start, along, &v, hat)?;
+        let (mut next, acting) = self.contact.apply_jvp(start, along, &v, hat)?;
         if let Some(closure) = &self.closure {
             let velocities = self.contact.velocities;
-            next.y = closure.jvp(start, velocities, along, &next, [&v, &after])?;
+            next.y = closure.jvp(start, velocities, along, &next, [&v, &acting])?;
         }
         Ok(next)
     }
@@ -340,9 +334,9 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
             Some(closure) => {
                 let velocities = self.contact.velocities;
                 let own = closure.vjp(start, velocities, next_bar, &mut bar)?;
-                let [own_before, own_after] = own.velocities;
-                let after = Some(&own_after);
-                let (v_bar, z) = self.contact.apply_vjp(start, &own.next, after, &mut bar)?;
+                let [own_before, own_acting] = own.velocities;
+                let acting = Some(&own_acting);
+                let (v_bar, z) = self.contact.apply_vjp(start, &own.next, acting, &mut bar)?;
                 (v_bar + own_before, z)
             }
         };

@@ -16,11 +16,13 @@
 
 mod ahead;
 mod contact;
+mod end_contact;
 mod energy;
 mod euler;
 mod hessian;
 mod middle_contact;
 mod midpoint;
+mod motion_push;
 mod pieces;
 mod plan;
 mod quasi;
@@ -37,7 +39,6 @@ mod stage_matrix;
 mod stages;
 mod start;
 mod velocity_euler;
-mod wet_contact;
 
 pub use plan::Stops;
 pub use record::{LinearisedStep, StepRecord};

@@ -1,0 +1,144 @@
+//! Contact in a step whose forces are those of its end: solved as for any step ([`super::contact`]) for the velocity v_s that it moves by, and for the momenta once more, with the force that
+//! this motion makes itself ([`super::motion_push`])
+//!
+//! ```text
+//! M (v_e − v*) = P + Δt g(q, v_e)      p̂⁺ = p̂ + Δt f(q, v*) + X⁻ᵀ (P + Δt g(q, v_e))
+//! ```
+
+use super::contact::{Problem, pressed, solve, solve_pushed};
+use super::motion_push::{MotionPush, Push};
+use super::stages::{ContactVelocities, Stages};
+use super::start::Start;
+use super::{State, StateBar, StateTangents, StepBar, StepTangents};
+use crate::Result;
+use nalgebra::{DMatrix, DVector};
+
+/// The end of a step from the velocity and the frame momenta before contact.
+pub(super) fn apply(
+    start: &Start,
+    before: DVector<f64>,
+    mut hat: DVector<f64>,
+) -> Result<(State, Stages)> {
+    let dt = start.stepper.dt;
+    let after = solve(start, &before, dt)?;
+    let mut velocities = ContactVelocities::new(before, after);
+    if let Some(motion) = MotionPush::new(start, &velocities)? {
+        let push = motion.push(start);
+        velocities.end = Some(solve_pushed(
+            start,
+            &velocities.before,
+            &push.user,
+            dt,
+            &velocities.after,
+        )?);
+        hat += push.frame;
+    }
+    let next = ends(start, &velocities, hat);
+    Ok((next, Stages::Contact(velocities)))
+}
+
+/// The state at the end of a step with these velocities, from the frame momenta with all but contact.
+fn ends(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
+    let hat = pressed(start, velocities.acting(), hat);
+    start.next_state(start.advance(&velocities.after), hat)
+}
+
+/// What the derivatives of [`apply`] need.
+pub(super) struct Adjoint<'s, 'a> {
+    pub velocities: &'s ContactVelocities,
+    moved: Problem<'a>,
+    end: Option<End<'a>>,
+}
+
+struct End<'a> {
+    problem: Problem<'a>,
+    motion: MotionPush,
+}
+
+impl<'s, 'a> Adjoint<'s, 'a> {
+    /// At a step's velocities before and after contact.
+    pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
+        let dt = start.stepper.dt;
+        let ContactVelocities { before, after, .. } = velocities;
+        let motion = MotionPush::new(start, velocities)?;
+        let end = motion.map(|motion| {
+            Ok(End {
+                problem: Problem::pushed(start, before, velocities.acting(), dt)?,
+                motion,
+            })
+        });
+        Ok(Self {
+            velocities,
+            moved: Problem::new(start, before, after, dt)?,
+            end: end.transpose()?,
+        })
+    }
+
+    /// The state at the end of the step, from the frame momenta before contact.
+    pub fn reached(&self, start: &Start, mut hat: DVector<f64>) -> State {
+        if let Some(End { motion, .. }) = &self.end {
+            hat += motion.push(start).frame;
+        }
+        ends(start, self.velocities, hat)
+    }
+
+    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity with which contact acts.
+    pub fn apply_jvp(
+        &self,
+        start: &Start,
+        along: &StepTangents,
+        before: &DMatrix<f64>,
+        mut hat: DMatrix<f64>,
+    ) -> Result<(StateTangents, DMatrix<f64>)> {
+        let velocities = self.velocities;
+        let after = self.moved.solve_jvp(start, along, before)?;
+        let q = start.advance_jvp(&velocities.after, along.q, &after);
+        let (problem, acting) = match &self.end {
+            None => (&self.moved, after),
+            Some(End { problem, motion }) => {
+                let push = motion.push_jvp(start, along, velocities, [before, &after])?;
+                hat += push.frame;
+                let end = problem.solve_pushed_jvp(start, along, before, &push.user)?;
+                (problem, end)
+            }
+        };
+        let hat = problem.pressed_jvp(start, along, &acting, hat);
+        let next = StateTangents {
+            q,
+            y: start.next_momenta(hat),
+        };
+        Ok((next, acting))
+    }
+
+    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, with that of the velocity with which contact acts from elsewhere; the rest is added to `bar`.
+    pub fn apply_vjp(
+        &self,
+        start: &Start,
+        next_bar: &StateBar,
+        own: Option<&DVector<f64>>,
+        bar: &mut StepBar,
+    ) -> Result<(DVector<f64>, DVector<f64>)> {
+        let (q_bar, mut after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
+        bar.state.q += q_bar;
+        let hat_bar = start.next_momentum_bar(next_bar);
+        let problem = self.end.as_ref().map_or(&self.moved, |end| &end.problem);
+        let mut acting_bar = problem.pressed_vjp(start, &hat_bar, bar);
+        if let Some(own) = own {
+            acting_bar += own;
+        }
+        let mut before_bar = DVector::zeros(hat_bar.len());
+        match &self.end {
+            None => after_bar += acting_bar,
+            Some(End { problem, motion }) => {
+                let (held, user) = problem.solve_pushed_vjp(start, &acting_bar, bar)?;
+                let frame = hat_bar.clone();
+                let push_bar = Push { user, frame };
+                let own = motion.push_vjp(start, self.velocities, &push_bar, bar)?;
+                after_bar += own.after;
+                before_bar += held + own.before;
+            }
+        }
+        before_bar += self.moved.solve_vjp(start, &after_bar, bar)?;
+        Ok((before_bar, hat_bar))
+    }
+}

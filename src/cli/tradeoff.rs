@@ -117,13 +117,14 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
     })?;
     drop(bar);
     let (mut files, mut lost) = (Vec::new(), None);
-    if let Some(file) = &arguments.plot {
+    let nothing = nothing_measured(&found);
+    // A picture of nothing isn't written.
+    if let (Some(file), None) = (&arguments.plot, &nothing) {
         match plot::write(file, &found) {
             Ok(()) => files.push(file.clone()),
             Err(error) => lost = Some(error),
         }
     }
-    let nothing = nothing_measured(&found);
     output.result(&TradeoffReport::new(found, files));
     // What took the time is said all the same.
     if let Some(error) = &lost {

@@ -227,6 +227,8 @@ fn fronts_are_right(report: &Value) {
 
 #[test]
 fn what_the_budget_has_no_time_for_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("nothing.svg");
     let arguments = [
         "tradeoff",
         &scene("cube"),
@@ -238,6 +240,8 @@ fn what_the_budget_has_no_time_for_is_said() {
         "192",
         "--budget",
         "0.01",
+        "--plot",
+        &picture.display().to_string(),
     ];
     let plain = hydrograd(&arguments);
     let text = String::from_utf8_lossy(&plain.stdout).into_owned();
@@ -247,7 +251,9 @@ fn what_the_budget_has_no_time_for_is_said() {
     let report: Value = serde_json::from_slice(&json.stdout).unwrap();
     assert!(!report["left_out"].as_array().unwrap().is_empty());
     assert_eq!(report["rows"], Value::Array(Vec::new()));
-    // Nothing was measured: that is no success.
+    // Nothing was measured: that is no success, and no picture.
+    assert!(!picture.exists());
+    assert_eq!(report["files"], Value::Array(Vec::new()));
     for done in [plain, json] {
         assert_eq!(done.status.code(), Some(1));
         let said = String::from_utf8(done.stderr).unwrap();

@@ -39,7 +39,7 @@ impl Target {
     /// Number of a coordinate of the initial state, and of the velocity that is its rate.
     ///
     /// # Errors
-    /// A label that none has, a coordinate that a motion drives, or part of a rotation.
+    /// A label that none has, a coordinate that a motion drives, or one of a joint that turns in three dimensions.
     pub fn coordinate(&self, simulator: &Simulator) -> Result<Option<(usize, usize)>> {
         let Self::Start(label) = self else {
             return Ok(None);
@@ -63,7 +63,7 @@ impl Target {
                 refuse("its joint is driven by a motion, which says where it starts".into())
             }
             Some((link, _)) if link.joint.quaternion_at().is_some() => {
-                refuse("it is part of a rotation: let the start be unknown (`start_within`)".into())
+                refuse("its joint turns in three dimensions, and none of its coordinates is unknown by itself: let the whole start be (`start_within`)".into())
             }
             Some((link, _)) => Ok(Some((i, link.v.start + i - link.q.start))),
             None => refuse("its joint follows another".into()),

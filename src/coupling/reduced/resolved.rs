@@ -107,8 +107,8 @@ fn closest(reduced: &Reduced, poses: &[Pose], quantity: &str, value: f64) -> Err
         ),
         value,
         limit: if value > 0.0 { ILL_CONDITIONED } else { 0.0 },
-        remedy: "the bodies overlap or their gap isn't resolved: use a smaller resolved gap, a \
-                 higher rank, or the fidelity full"
+        remedy: "the bodies overlap or their gap isn't resolved: use more faces, a smaller resolved gap, \
+                 a higher rank, or the fidelity full"
             .into(),
     }
 }
@@ -148,9 +148,10 @@ fn check_energy(reduced: &Reduced, basis: &DMatrix<f64>, momenta: &DMatrix<f64>)
         quantity: "smallest eigenvalue of their added mass, scaled by the water displaced".into(),
         value: lowest,
         limit: 0.0,
-        remedy: "a gap isn't resolved: use a smaller resolved gap, a higher rank, or the fidelity \
-                 full"
-            .into(),
+        remedy:
+            "a gap isn't resolved: use more faces, a smaller resolved gap, a higher rank, or the \
+                 fidelity full"
+                .into(),
     })
 }
 

@@ -228,8 +228,13 @@ pub(super) fn solve_stage<'a>(
             "bodies are up to {farthest:.1e} m from the world's origin, and momenta about it lose their digits: put the origin near the bodies, or take an explicit integrator"
         ),
         false => format!(
-            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad in it)",
-            turning * rule.reach.max(2.0 * (rule.h - rule.reach))
+            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad in it){}",
+            turning * rule.reach.max(2.0 * (rule.h - rule.reach)),
+            match rule.reach > 0.0 && tree.links().iter().any(|link| link.parent.is_some()) {
+                true =>
+                    ", or the integrator `midpoint`, which bears light bodies that carry heavy ones",
+                false => "",
+            }
         ),
     };
     Err(Error::Solver {

@@ -5,10 +5,8 @@
 //! that is implicit in it solves contact implicitly, against the mass matrix with its fluid part.
 
 use super::contact::sharpened;
-use super::slopes::unit;
 use super::{
-    ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, Slopes,
-    System,
+    ContactForce, Dual, Evaluation, ForceCotangents, JointLimit, PairContact, Parameters, System,
 };
 use crate::Result;
 use crate::adjoint::contact::{Push, contact_force, contact_force_jvp, contact_force_vjp};
@@ -106,7 +104,12 @@ impl Evaluation<'_> {
 
     /// Whether any force acts in contact at the velocity `v`, or any damper that is solved with it at some; where none does, none changes with v either.
     pub(super) fn contact_acts(&self, v: &DVector<f64>) -> bool {
-        if self.damps() || self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) {
+        self.limit_forces(v).any(|(_, forces)| forces != [0.0; 2]) || self.touches(v)
+    }
+
+    /// Whether surfaces press on one another at the velocity `v`, or any damper between them does anything at some.
+    pub(super) fn touches(&self, v: &DVector<f64>) -> bool {
+        if self.damps() {
             return true;
         }
         if self.contact_points.is_empty() {
@@ -116,6 +119,11 @@ impl Evaluation<'_> {
         let push = |t: &PairContact| contact_force(&t.law, &t.point_state(&twists));
         let acts = |t: &PairContact| push(t) != Push::default();
         self.contact_points.iter().any(acts)
+    }
+
+    /// Whether that may be at some velocity.
+    pub(super) fn may_touch(&self) -> bool {
+        !self.contact_points.is_empty() || self.damps()
     }
 
     /// Generalised forces of contact at the velocity `v`, with the dampers that are solved with it.
@@ -248,19 +256,6 @@ impl Evaluation<'_> {
             out.v[l.v] += v_bar;
         }
         out
-    }
-
-    /// Derivatives of the entries `entries` of [`Evaluation::contact_force`]; the others have none.
-    pub(super) fn contact_force_slopes(
-        &self,
-        v: &DVector<f64>,
-        dual: Dual,
-        entries: &[usize],
-    ) -> Slopes {
-        let row = |i: &usize| self.contact_force_vjp(v, &unit(v.len(), *i), dual);
-        let rows: Vec<_> = entries.iter().map(row).collect();
-        let zero = ForceCotangents::zeros(self);
-        Slopes::from_rows(v.len(), entries, &rows, &zero)
     }
 
     /// Each limit with the forces of its stops at the velocity `v`.

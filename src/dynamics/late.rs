@@ -31,7 +31,7 @@ pub(super) struct LateBars {
 }
 
 impl System {
-    fn late_forces(&self) -> impl Iterator<Item = &dyn ForceModel> {
+    pub(super) fn late_forces(&self) -> impl Iterator<Item = &dyn ForceModel> {
         let all = self.forces.iter().map(AsRef::as_ref);
         all.filter(|f: &&dyn ForceModel| f.is_late())
     }

@@ -33,6 +33,7 @@ mod motion_force;
 mod motions;
 mod parameters;
 mod recoil;
+mod resistance;
 mod shape;
 mod shapes;
 mod slopes;

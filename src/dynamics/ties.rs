@@ -35,6 +35,11 @@ impl Evaluation<'_> {
         self.tied(self.system.dampers().map(|f| f.ties_at(&place)).collect())
     }
 
+    /// The same of what resists motion beside contact.
+    pub(super) fn resisted_islands(&self) -> Islands {
+        self.tied(self.system.resisting().map(|f| f.ties()).collect())
+    }
+
     /// Of bodies that joints and these ties hold together; one of all where ties aren't known.
     fn tied(&self, ties: Option<Vec<Vec<[usize; 2]>>>) -> Islands {
         let tree = &self.system.tree;

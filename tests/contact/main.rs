@@ -10,6 +10,7 @@ mod parts;
 mod passing;
 mod physics;
 mod pieces;
+mod pressed;
 mod resistance;
 mod standard;
 mod tools;

@@ -42,10 +42,6 @@ pub fn rungs() -> Vec<Rung> {
             name: "dynamics::integrator::end_contact::Adjoint::apply_vjp",
             check: |c| all(INTEGRATORS.map(|i| step_vjp(i, c))),
         },
-        Rung {
-            name: "dynamics::integrator::middle_contact::Adjoint::apply_vjp",
-            check: |c| step_vjp(Integrator::Midpoint, c),
-        },
     ]
 }
 

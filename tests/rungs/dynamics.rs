@@ -6,7 +6,7 @@ use super::tools::{Group, all, groups, vector_along, wavy};
 use hydrograd::adjoint::check::{Outcome, Rung};
 use hydrograd::dynamics::{
     Drive, Input, Integrator, Linearisation, Owner, Parameters, Range, State, StateBar, StepBar,
-    Stepper, System,
+    StepRecord, Stepper, System,
 };
 use hydrograd::scene::{
     Body, Current, Damping, Drag, DragPart, Edge, Fin, Float, Fluid, Force, Joint, Mimic, Motion,
@@ -35,6 +35,8 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::start::Start::momentum_vjp" => released,
         "dynamics::integrator::euler::Adjoint::vjp" => |c| step(Integrator::MomentumEuler, c),
         "dynamics::integrator::energy::Closure::vjp" => closed,
+        "dynamics::integrator::middle_contact::Adjoint::apply_vjp" => |c| limited(Integrator::Midpoint, c),
+        "dynamics::integrator::reaction::Reaction::force_vjp" => |c| limited(Integrator::MomentumEuler, c),
         "dynamics::integrator::midpoint::Adjoint::vjp" => |c| step(Integrator::Midpoint, c),
         "dynamics::integrator::runge_kutta::Adjoint::vjp" =>
             |c| step(Integrator::Rk4, c).worst(step(Integrator::Rk2, c)),
@@ -663,6 +665,66 @@ pub fn still() -> &'static Simulator {
         let settings = settings.integrator(Integrator::EnergyEuler);
         Simulator::new(&scene, settings).expect("the scene is right")
     })
+}
+
+/// Steps of [`still`].
+pub fn still_stepper(parameters: &Parameters, integrator: Integrator) -> Stepper<'_> {
+    Stepper {
+        system: still().system(),
+        parameters,
+        integrator,
+        dt: DT,
+    }
+}
+
+/// The state that it starts from, and the step there.
+pub fn still_point(integrator: Integrator) -> Point {
+    let parameters = still().parameters().clone();
+    let at = point();
+    let s = still_stepper(&parameters, integrator);
+    let e = s.system.linearise(&parameters, &at.q, TIME).unwrap();
+    let v = s.conserved(&e, &at.v);
+    drop(e);
+    Point {
+        v,
+        parameters,
+        ..at
+    }
+}
+
+pub fn still_step(p: &Point, integrator: Integrator) -> (State, StepRecord) {
+    let s = still_stepper(&p.parameters, integrator);
+    let e = s.system.linearise(&p.parameters, &p.q, TIME).unwrap();
+    let at = state(p, &[]);
+    let v = s.velocity(&e, &at).unwrap();
+    let input = Input {
+        control: p.u.clone(),
+        hold: Vec::new(),
+    };
+    s.step(&e, &at, &v, &input).unwrap()
+}
+
+/// A step in which a joint with friction presses on its limit, of bodies that drag.
+fn limited(integrator: Integrator, c: f64) -> Outcome {
+    let p = still_point(integrator);
+    let n = p.v.len();
+    let (q_bar, y_bar) = (wavy(n, 5.1, 1.0), wavy(n, 6.1, 1.0));
+    let base = still_step(&p, integrator);
+    let velocities = base.1.contact_velocities().unwrap();
+    let pressed = (&velocities.after - &velocities.before).norm();
+    assert!(pressed > 1e-3, "{pressed:.1e}");
+    let tree = &still().system().tree;
+    let value = |p: &Point| {
+        let next = still_step(p, integrator).0;
+        q_bar.dot(&tree_displacement(tree, &base.0.q, &next.q)) + y_bar.dot(&next.y)
+    };
+    let next_bar = StateBar {
+        q: q_bar.clone(),
+        y: y_bar.clone(),
+    };
+    let s = still_stepper(&p.parameters, integrator);
+    let b = s.linearise_step(&base.1).unwrap().state_vjp(&next_bar);
+    check(false, &value, &p, &bar_of(b.unwrap()), c)
 }
 
 /// A step whose energy is closed, from where all move and something is pressed, which is what the correction consists of.

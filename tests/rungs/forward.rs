@@ -36,7 +36,8 @@ pub fn rungs() -> Vec<Rung> {
         "dynamics::integrator::velocity_euler::Adjoint::jvp" => |c| both(Integrator::VelocityEuler, c),
         "dynamics::integrator::end_contact::Adjoint::apply_jvp" =>
             |c| all(contact::INTEGRATORS.map(|i| pressed(i, c))),
-        "dynamics::integrator::middle_contact::Adjoint::apply_jvp" => |c| pressed(Integrator::Midpoint, c),
+        "dynamics::integrator::middle_contact::Adjoint::apply_jvp" => |c| limited(Integrator::Midpoint, c),
+        "dynamics::integrator::reaction::Reaction::force_jvp" => |c| limited(Integrator::MomentumEuler, c),
         "simulate::tangents::Rollout::jvp" => |c| all(INTEGRATORS.map(|i| rollout(i, &["positions", "rotations"], c))),
         "simulate::observable::pose::Positions::jvp" => |c| rollout(Integrator::Rk2, &["positions"], c),
         "simulate::observable::pose::Rotations::jvp" => |c| rollout(Integrator::Rk2, &["rotations"], c),
@@ -248,6 +249,23 @@ fn step(integrator: Integrator, before: &[&str], now: &[&str], c: f64) -> Outcom
         let [q, y] = [&found.q, &found.y].map(|m| c * m.column(k));
         vector_along(value, &joined(&[&q, &y]))
     }))
+}
+
+/// A step in which a joint with friction presses on its limit, of bodies that drag.
+fn limited(integrator: Integrator, c: f64) -> Outcome {
+    let p = dynamics::still_point(integrator);
+    let (base, record) = dynamics::still_step(&p, integrator);
+    let along = Along::new(&p, 0.0);
+    let s = dynamics::still_stepper(&p.parameters, integrator);
+    let step = s.linearise_step(&record).unwrap();
+    let found = through(&step, std::slice::from_ref(&along));
+    let tree = &still().system().tree;
+    let value = |h: f64| {
+        let next = dynamics::still_step(&along.at(&p, h), integrator).0;
+        joined(&[&tree_displacement(tree, &base.q, &next.q), &next.y])
+    };
+    let [q, y] = [&found.q, &found.y].map(|m| c * m.column(0));
+    vector_along(value, &joined(&[&q, &y]))
 }
 
 /// What the closure of the energy adds to a step's momenta, which is small beside it.

@@ -235,6 +235,14 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
     (
+        "dynamics::resistance::Evaluation::resistance_vjp",
+        "dynamics::integrator::reaction::Reaction::force_vjp",
+    ),
+    (
+        "dynamics::resistance::Evaluation::late_resistance_vjp",
+        "dynamics::integrator::reaction::Reaction::force_vjp",
+    ),
+    (
         "dynamics::integrator::motion_push::MotionPush::push_vjp",
         "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
@@ -351,6 +359,10 @@ const THROUGH: &[(&str, &str)] = &[
     (
         "dynamics::integrator::contact::Problem::solve_jvp",
         "dynamics::integrator::end_contact::Adjoint::apply_jvp",
+    ),
+    (
+        "dynamics::resistance::Evaluation::resistance_jvp",
+        "dynamics::integrator::reaction::Reaction::force_jvp",
     ),
     (
         "dynamics::integrator::motion_push::MotionPush::push_jvp",

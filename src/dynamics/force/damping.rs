@@ -130,6 +130,12 @@ impl Law for Damping {
         all.any(|e| parameters[e.value] != 0.0)
     }
 
+    /// By axes: a matrix needn't be symmetric.
+    fn resists(&self) -> bool {
+        let mut all = self.linear.iter().chain(&self.quadratic);
+        all.all(|e| e.row == e.column)
+    }
+
     fn check(&self, parameters: &Parameters) -> Result<()> {
         least_damping(&matrix(&self.linear, parameters), self.place.clone())
     }

@@ -326,6 +326,10 @@ impl ForceModel for Drag {
         }
     }
 
+    fn resists(&self) -> bool {
+        true
+    }
+
     fn ties(&self) -> Option<Vec<[usize; 2]>> {
         Some(Vec::new())
     }

@@ -52,6 +52,11 @@ pub(super) trait Law: Send + Sync {
         None
     }
 
+    /// Whether it resists motion ([`ForceModel::resists`]).
+    fn resists(&self) -> bool {
+        false
+    }
+
     /// Refuses parameters that no single one's range does.
     fn check(&self, _parameters: &Parameters) -> Result<()> {
         Ok(())
@@ -147,6 +152,10 @@ impl<L: Law> ForceModel for Local<L> {
                 bar.pose[b] -= cross_force(&relative, &nu_bar) + cross_force(virt, &wrench);
             }
         }
+    }
+
+    fn resists(&self) -> bool {
+        self.laws.iter().all(Law::resists)
     }
 
     fn ties(&self) -> Option<Vec<[usize; 2]>> {

@@ -342,6 +342,12 @@ pub trait ForceModel: Send + Sync {
         false
     }
 
+    /// Whether it resists motion: its derivative by the velocity is then symmetric, and takes energy. Contact is solved with what it changes by as contact changes the velocity
+    /// (`dynamics::resistance`), and with that of those that are late.
+    fn resists(&self) -> bool {
+        false
+    }
+
     /// Whether it is solved with contact, at the end of a step and in the velocity that the step moves by: a damper that is too stiff to act at any other. It is then
     /// linear in the twists of the bodies, symmetric, takes energy away, and acts on bodies alone; integrators that don't solve contact refuse it.
     fn solved_with_contact(&self) -> bool {

@@ -200,6 +200,10 @@ impl ForceModel for Springs {
         }
     }
 
+    fn resists(&self) -> bool {
+        true
+    }
+
     fn ties(&self) -> Option<Vec<[usize; 2]>> {
         let both = |s: &Spring| Some([s.ends[0].body?, s.ends[1].body?]);
         Some(self.0.iter().filter_map(both).collect())

@@ -131,6 +131,10 @@ impl ForceModel for Tendons {
         }
     }
 
+    fn resists(&self) -> bool {
+        true
+    }
+
     fn ties(&self) -> Option<Vec<[usize; 2]>> {
         let pairs = |t: &Tendon| -> Vec<[usize; 2]> {
             let each = t.over.windows(2);

@@ -11,6 +11,7 @@
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
 use super::hessian::Hessian;
+use super::reaction::{Reaction, Resisting};
 use super::split::share;
 use super::start::Start;
 use super::{StepBar, StepTangents};
@@ -60,9 +61,15 @@ struct Step {
 }
 
 /// The velocity after contact that acts for `dt` (s), from the one before it; the same bits where nothing presses.
-pub(super) fn solve(start: &Start, before: &DVector<f64>, dt: f64) -> Result<DVector<f64>> {
+pub(super) fn solve(
+    start: &Start,
+    before: &DVector<f64>,
+    dt: f64,
+    resisting: Resisting,
+) -> Result<DVector<f64>> {
+    let still = DVector::zeros(before.len());
     match start.near.contact_acts(before) {
-        true => solve_pushed(start, before, &DVector::zeros(before.len()), dt, before),
+        true => solve_pushed(start, before, &still, dt, (before, resisting)),
         // At no force v* is the least of the convex problem.
         false => start.near.check_damping().map(|()| before.clone()),
     }
@@ -74,13 +81,14 @@ pub(super) fn solve_pushed(
     before: &DVector<f64>,
     push: &DVector<f64>,
     dt: f64,
-    guess: &DVector<f64>,
+    (guess, resisting): (&DVector<f64>, Resisting),
 ) -> Result<DVector<f64>> {
     let (e, split) = (start.near, start.split);
     e.check_damping()?;
     if split.free.is_empty() {
         return Ok(before.clone());
     }
+    let reaction = Reaction::new(start, before, resisting);
     let sized = split.sizes(&e.mass_blocks().diagonal());
     let summands = e.mass_blocks().mapped(DMatrix::abs);
     let least = sized(&summands.times(&before.abs())).max(sized(push));
@@ -89,9 +97,9 @@ pub(super) fn solve_pushed(
     let in_water = Cell::new(0.0);
     let at = |v: DVector<f64>, moved: Option<DVector<f64>>, behind: Vec<f64>| {
         let moved = moved.unwrap_or_else(|| e.mass_times(&(&v - before)));
-        let imbalance = &moved - push - dt * e.contact_force(&v, Dual::User);
+        let imbalance = &moved - push - dt * reaction.force(&v, Dual::User);
         let size = sized(&summands.times(&v.abs())).max(least);
-        let size = size.max(dt * sized(&e.contact_effort(&v)));
+        let size = size.max(dt * sized(&reaction.effort(&v)));
         let lacking = share(
             behind.iter().map(|x| x * x).sum::<f64>().sqrt(),
             in_water.get(),
@@ -127,13 +135,13 @@ pub(super) fn solve_pushed(
         };
         let goal = forced.max(FINE * RESIDUAL / now.residual).min(COARSE);
         previous = now.residual;
-        let hessian = Hessian::new(e, split, &now.v, dt, &mut places)?;
+        let hessian = Hessian::new(e, split, &reaction, &now.v, dt, &mut places)?;
         let (step, left) = hessian.step(&split.take(&now.imbalance), &now.behind, goal);
         let v = split.put(&step);
         let sizes = [before, &(&now.v - &v)].map(|v| hessian.size(v));
         in_water.set(sizes.into_iter().fold(in_water.get(), f64::max));
         // Where a product with M is a solve it follows from that of the step, (M − Δt ∂g/∂v) s being the imbalance.
-        let moved = by_products.then(|| &now.imbalance + dt * e.contact_force_jvp(&now.v, &v));
+        let moved = by_products.then(|| &now.imbalance + dt * reaction.force_jvp(&now.v, &v));
         now = search(now, &Step { v, moved, left }, &at);
     }
     Err(Error::Solver {
@@ -188,14 +196,21 @@ fn search(
     best
 }
 
-/// The frame momenta `hat` with what contact adds in a step, from the velocity after it.
-pub(super) fn pressed(start: &Start, after: &DVector<f64>, hat: DVector<f64>) -> DVector<f64> {
-    if !start.near.contact_acts(after) {
+/// The frame momenta `hat` with what contact adds in a step, from the velocities before and after it.
+pub(super) fn pressed(
+    start: &Start,
+    before: &DVector<f64>,
+    after: &DVector<f64>,
+    hat: DVector<f64>,
+    resisting: Resisting,
+) -> DVector<f64> {
+    if before == after && !start.near.contact_acts(after) {
         return hat;
     }
     // Where the momenta are taken drifts on during the step.
     let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
-    hat + drift.carry(dt, dt * start.near.contact_force(after, Dual::Frame))
+    let reaction = Reaction::new(start, before, resisting);
+    hat + drift.carry(dt, dt * reaction.force(after, Dual::Frame))
 }
 
 /// A problem of contact that has been solved: what the derivatives of [`solve`] and [`pressed`] need.
@@ -204,6 +219,7 @@ pub(super) struct Problem<'a> {
     after: DVector<f64>,
     /// For which contact acts, s.
     time: f64,
+    resisting: Resisting,
     acting: Acting<'a>,
 }
 
@@ -223,13 +239,15 @@ impl<'a> Problem<'a> {
         before: &DVector<f64>,
         after: &DVector<f64>,
         time: f64,
+        resisting: Resisting,
     ) -> Result<Self> {
         match start.near.contact_acts(before) {
-            true => Self::pushed(start, before, after, time),
+            true => Self::pushed(start, before, after, time, resisting),
             false => Ok(Self {
                 before: before.clone(),
                 after: after.clone(),
                 time,
+                resisting,
                 acting: Acting::No,
             }),
         }
@@ -241,17 +259,21 @@ impl<'a> Problem<'a> {
         before: &DVector<f64>,
         after: &DVector<f64>,
         time: f64,
+        resisting: Resisting,
     ) -> Result<Self> {
         let (e, split) = (start.near, start.split);
         let acting = if split.free.is_empty() {
             Acting::Driven
         } else {
-            Acting::Solved(Hessian::new(e, split, after, time, &mut Places::default())?)
+            let reaction = Reaction::new(start, before, resisting);
+            let mut places = Places::default();
+            Acting::Solved(Hessian::new(e, split, &reaction, after, time, &mut places)?)
         };
         Ok(Self {
             before: before.clone(),
             after: after.clone(),
             time,
+            resisting,
             acting,
         })
     }
@@ -259,7 +281,7 @@ impl<'a> Problem<'a> {
     /// Tangents of [`solve`], from those of the velocity before contact.
     pub fn solve_jvp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         along: &StepTangents,
         before: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>> {
@@ -270,7 +292,7 @@ impl<'a> Problem<'a> {
     /// The same of [`solve_pushed`], with those of the impulse.
     pub fn solve_pushed_jvp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         along: &StepTangents,
         before: &DMatrix<f64>,
         push: &DMatrix<f64>,
@@ -278,13 +300,16 @@ impl<'a> Problem<'a> {
         let Acting::Solved(hessian) = &self.acting else {
             return Ok(before.clone());
         };
-        let (e, near, split) = (start.e, start.near, start.split);
+        let (e, split) = (start.e, start.split);
         let change = &self.after - &self.before;
-        let pressed = near.contact_force_slopes(&self.after, Dual::User, &split.free);
+        let reaction = self.reaction(start);
+        let pressed = reaction.slopes(&self.after, Dual::User, &split.free);
         let inertia = e.mass_slopes(&change, &split.free, along.inputs.has_parameters())?;
         let moved = columns(before, |v| e.mass_times(v));
-        let right = moved + push + self.time * pressed.along(along.q, None, along.inputs)
-            - inertia.along(along.q, None, along.inputs);
+        let reacted = pressed.force.along(along.q, None, along.inputs)
+            + pressed.before * before
+            + pressed.start * along.v;
+        let right = moved + push + self.time * reacted - inertia.along(along.q, None, along.inputs);
         let mut after = before.clone();
         let free = hessian.solve_columns(&split.take_rows(&right));
         e.check()?;
@@ -298,7 +323,7 @@ impl<'a> Problem<'a> {
     /// `bar`.
     pub fn solve_vjp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         after_bar: &DVector<f64>,
         bar: &mut StepBar,
     ) -> Result<DVector<f64>> {
@@ -308,61 +333,67 @@ impl<'a> Problem<'a> {
     /// The same of [`solve_pushed`], with that of the impulse.
     pub fn solve_pushed_vjp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         after_bar: &DVector<f64>,
         bar: &mut StepBar,
     ) -> Result<(DVector<f64>, DVector<f64>)> {
         let Acting::Solved(hessian) = &self.acting else {
             return Ok((after_bar.clone(), DVector::zeros(after_bar.len())));
         };
-        let (e, near, split) = (start.e, start.near, start.split);
+        let (e, split) = (start.e, start.split);
         let w = split.put(&hessian.solve(&split.take(after_bar)));
-        bar.add(
-            self.time,
-            &near.contact_force_vjp(&self.after, &w, Dual::User),
-        );
+        let reacted = (self.reaction(start)).force_vjp(&self.after, &w, Dual::User);
+        bar.add(self.time, &reacted.force);
+        bar.v += self.time * reacted.start;
         bar.add(-1.0, &e.mass_vjp(&(&self.after - &self.before), &w)?);
         // Driven velocities are what they are.
         let mut before_bar = after_bar.clone();
-        let moved = e.mass_times(&w);
+        let moved = e.mass_times(&w) + self.time * reacted.before;
         for &i in &split.free {
             before_bar[i] = moved[i];
         }
         Ok((before_bar, w))
     }
 
-    /// Tangents of [`pressed`], from those of the velocity after contact and of the momenta before it.
+    fn reaction<'r>(&'r self, start: &Start<'r, 'a>) -> Reaction<'r, 'a> {
+        Reaction::new(start, &self.before, self.resisting)
+    }
+
+    /// Tangents of [`pressed`], from those of the velocities before and after contact and of the momenta before it.
     pub fn pressed_jvp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         along: &StepTangents,
-        after: &DMatrix<f64>,
+        [before, after]: [&DMatrix<f64>; 2],
         hat: DMatrix<f64>,
     ) -> DMatrix<f64> {
         if matches!(self.acting, Acting::No) {
             return hat;
         }
-        let (near, entries) = (start.near, &start.split.free);
-        let pressed = near.contact_force_slopes(&self.after, Dual::Frame, entries);
-        let pressed = pressed.along(along.q, Some(after), along.inputs);
+        let reaction = self.reaction(start);
+        let slopes = reaction.slopes(&self.after, Dual::Frame, &start.split.free);
+        let pressed = (slopes.force).along(along.q, Some(after), along.inputs)
+            + slopes.before * before
+            + slopes.start * along.v;
         let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
         hat + columns(&pressed, |g| drift.carry(dt, dt * g))
     }
 
-    /// Transpose of [`pressed`]: the cotangent of the velocity after contact; the rest is added to `bar`.
+    /// Transpose of [`pressed`]: the cotangents of the velocities before and after contact; the rest is added to `bar`.
     pub fn pressed_vjp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         hat_bar: &DVector<f64>,
         bar: &mut StepBar,
-    ) -> DVector<f64> {
+    ) -> [DVector<f64>; 2] {
         if matches!(self.acting, Acting::No) {
-            return DVector::zeros(hat_bar.len());
+            return [(); 2].map(|()| DVector::zeros(hat_bar.len()));
         }
         let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
         let impulse_bar = drift.carry_back(dt, hat_bar.clone());
-        let pressed = (start.near).contact_force_vjp(&self.after, &impulse_bar, Dual::Frame);
-        bar.add(dt, &pressed);
-        dt * pressed.v
+        let pressed = (self.reaction(start)).force_vjp(&self.after, &impulse_bar, Dual::Frame);
+        bar.add(dt, &pressed.force);
+        bar.v += dt * pressed.start;
+        [dt * pressed.before, dt * pressed.force.v]
     }
 }

@@ -7,7 +7,8 @@
 
 use super::contact::{Problem, pressed, solve, solve_pushed};
 use super::motion_push::{MotionPush, Push};
-use super::stages::{ContactVelocities, Stages};
+use super::reaction::Resisting;
+use super::stages::ContactVelocities;
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
@@ -18,28 +19,29 @@ pub(super) fn apply(
     start: &Start,
     before: DVector<f64>,
     mut hat: DVector<f64>,
-) -> Result<(State, Stages)> {
+) -> Result<(State, ContactVelocities)> {
     let dt = start.stepper.dt;
-    let after = solve(start, &before, dt)?;
+    let after = solve(start, &before, dt, Resisting::AtStart)?;
     let mut velocities = ContactVelocities::new(before, after);
-    if let Some(motion) = MotionPush::new(start, &velocities)? {
+    if let Some(motion) = MotionPush::new(start, &velocities, Resisting::No)? {
         let push = motion.push(start);
         velocities.end = Some(solve_pushed(
             start,
             &velocities.before,
             &push.user,
             dt,
-            &velocities.after,
+            (&velocities.after, Resisting::AtStart),
         )?);
         hat += push.frame;
     }
     let next = ends(start, &velocities, hat);
-    Ok((next, Stages::Contact(velocities)))
+    Ok((next, velocities))
 }
 
 /// The state at the end of a step with these velocities, from the frame momenta with all but contact.
 fn ends(start: &Start, velocities: &ContactVelocities, hat: DVector<f64>) -> State {
-    let hat = pressed(start, velocities.acting(), hat);
+    let ContactVelocities { before, .. } = velocities;
+    let hat = pressed(start, before, velocities.acting(), hat, Resisting::AtStart);
     start.next_state(start.advance(&velocities.after), hat)
 }
 
@@ -60,16 +62,22 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let dt = start.stepper.dt;
         let ContactVelocities { before, after, .. } = velocities;
-        let motion = MotionPush::new(start, velocities)?;
+        let motion = MotionPush::new(start, velocities, Resisting::No)?;
         let end = motion.map(|motion| {
             Ok(End {
-                problem: Problem::pushed(start, before, velocities.acting(), dt)?,
+                problem: Problem::pushed(
+                    start,
+                    before,
+                    velocities.acting(),
+                    dt,
+                    Resisting::AtStart,
+                )?,
                 motion,
             })
         });
         Ok(Self {
             velocities,
-            moved: Problem::new(start, before, after, dt)?,
+            moved: Problem::new(start, before, after, dt, Resisting::AtStart)?,
             end: end.transpose()?,
         })
     }
@@ -85,7 +93,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity with which contact acts.
     pub fn apply_jvp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         along: &StepTangents,
         before: &DMatrix<f64>,
         mut hat: DMatrix<f64>,
@@ -102,7 +110,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
                 (problem, end)
             }
         };
-        let hat = problem.pressed_jvp(start, along, &acting, hat);
+        let hat = problem.pressed_jvp(start, along, [before, &acting], hat);
         let next = StateTangents {
             q,
             y: start.next_momenta(hat),
@@ -113,7 +121,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, with that of the velocity with which contact acts from elsewhere; the rest is added to `bar`.
     pub fn apply_vjp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         next_bar: &StateBar,
         own: Option<&DVector<f64>>,
         bar: &mut StepBar,
@@ -122,11 +130,10 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         bar.state.q += q_bar;
         let hat_bar = start.next_momentum_bar(next_bar);
         let problem = self.end.as_ref().map_or(&self.moved, |end| &end.problem);
-        let mut acting_bar = problem.pressed_vjp(start, &hat_bar, bar);
+        let [mut before_bar, mut acting_bar] = problem.pressed_vjp(start, &hat_bar, bar);
         if let Some(own) = own {
             acting_bar += own;
         }
-        let mut before_bar = DVector::zeros(hat_bar.len());
         match &self.end {
             None => after_bar += acting_bar,
             Some(End { problem, motion }) => {

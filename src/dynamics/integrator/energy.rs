@@ -7,7 +7,7 @@
 //! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v*) − ½ Δt g(q, v_e)ᵀ (v + v_e)
 //! ```
 //!
-//! F being all forces but the water's inertia, g those of contact; all velocities relative to the drift where there is a current ([`crate::dynamics::Drift`]). It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
+//! F being all forces but the water's inertia, g those of contact, with what resists motion otherwise than at v; all velocities relative to the drift where there is a current ([`crate::dynamics::Drift`]). It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
 //! but for the rigid one B ω of all bodies together that nothing in the water or the joints stands against ([`System::symmetric`](crate::dynamics::System)), which holds
 //! the momentum along B:
 //!
@@ -21,6 +21,7 @@
 //!
 //! This is a projection on the energy (Hairer, Lubich, Wanner, "Geometric Numerical Integration", IV.4) in the one direction that keeps momenta.
 
+use super::reaction::{Reaction, Resisting};
 use super::stages::ContactVelocities;
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents, readout};
@@ -116,6 +117,7 @@ impl Parts {
         hat: &DVector<f64>,
     ) -> Result<Option<Self>> {
         let (s, e, near, split) = (start.stepper, start.e, start.near, start.split);
+        let reaction = Reaction::new(start, &velocities.before, Resisting::AtStart);
         let drifting = Drifting::new(start, velocities);
         let (before, acting) = (&drifting.before, &drifting.acting);
         let v = readout::solve(end, split, hat)? - s.system.drift.velocity();
@@ -150,7 +152,7 @@ impl Parts {
         let mut defect = kinetic - e.mass_energy(first) - 0.5 * s.dt * loads.dot(&(first + &v));
         let contact = near
             .contact_acts(&velocities.before)
-            .then(|| near.contact_force(velocities.acting(), Dual::User));
+            .then(|| reaction.force(velocities.acting(), Dual::User));
         let speed = e.mass_energy(before);
         let mut lost = 0.0;
         if let Some(g) = &contact {
@@ -284,7 +286,7 @@ impl<'a> Closure<'a> {
         next_bar: &StateBar,
         bar: &mut StepBar,
     ) -> Result<ClosureBar> {
-        let (s, e, near, parts) = (start.stepper, start.e, start.near, &self.parts);
+        let (s, e, parts) = (start.stepper, start.e, &self.parts);
         let drifting = Drifting::new(start, velocities);
         let (first, before, acting) = (&drifting.start, &drifting.before, &drifting.acting);
         let end = &self.end;
@@ -351,10 +353,11 @@ impl<'a> Closure<'a> {
         bar.add(-0.5 * defect_bar, &e.mass_vjp(first, first)?);
         if let Some(g) = &parts.contact {
             let along = half * (before + acting);
-            let work = near.contact_force_vjp(velocities.acting(), &along, Dual::User);
-            bar.add(-defect_bar, &work);
-            out.velocities[0] -= defect_bar * half * g;
-            out.velocities[1] -= defect_bar * (half * g + &work.v);
+            let reaction = Reaction::new(start, &velocities.before, Resisting::AtStart);
+            let work = reaction.force_vjp(velocities.acting(), &along, Dual::User);
+            bar.add(-defect_bar, &work.force);
+            out.velocities[0] -= defect_bar * (half * g + &work.before);
+            out.velocities[1] -= defect_bar * (half * g + &work.force.v);
             if parts.lost > 0.0 {
                 let lost = acting - before;
                 // Of both energies; finite where nothing moved before.

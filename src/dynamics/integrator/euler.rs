@@ -255,11 +255,30 @@ fn rule(s: &Stepper) -> Rule {
 }
 
 pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
+    let (v, hat) = free(start)?;
+    let (next, velocities) = end_contact::apply(start, v, hat)?;
+    Ok((next, Stages::Contact(velocities)))
+}
+
+/// The velocity and the frame momenta with which a step ends without contact.
+fn free(start: &Start) -> std::result::Result<(DVector<f64>, DVector<f64>), Halt> {
     let (s, e) = (start.stepper, start.e);
     let p = start.momentum();
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
-    let y = &p + s.dt * &stage.force;
-    Ok(end_contact::apply(start, stage.v, y)?)
+    Ok((stage.v, p + s.dt * stage.force))
+}
+
+/// The step, if surfaces press in it, of an integrator that leaves those to this one; also where they don't, with `always`.
+pub(super) fn touching(
+    start: &Start,
+    always: bool,
+) -> std::result::Result<Option<(State, Stages)>, Halt> {
+    let (v, hat) = free(start)?;
+    if !always && !start.near.touches(&v) {
+        return Ok(None);
+    }
+    let (next, velocities) = end_contact::apply(start, v, hat)?;
+    Ok(Some((next, Stages::Touching(velocities))))
 }
 
 /// The same, whose energy is closed.
@@ -267,7 +286,7 @@ pub(super) fn closed_step(start: &Start) -> std::result::Result<(State, Stages),
     let (next, stages) = step(start)?;
     match &stages {
         Stages::Contact(velocities) => Ok((energy::close(start, velocities, next)?, stages)),
-        Stages::RungeKutta(_) => Ok((next, stages)),
+        _ => Ok((next, stages)),
     }
 }
 

@@ -1,10 +1,12 @@
-//! The Hessian M + Δt Jᵀ G J of the problem of contact on the free velocities, factored: as one matrix of a few velocities and of bodies that feel each other through
+//! The Hessian M + Δt Jᵀ G J of the problem of contact on the free velocities, with what resists motion beside it, factored: as one matrix of a few velocities and of bodies that feel each other through
 //! the water, else as a sparse one, in an order of elimination in which bodies that touch many others come last. Many bodies that are coupled by products press in what is
 //! theirs alone, films between them weighing with it, and all of that recoils in what else they exchange.
 
+use super::reaction::Reaction;
 use super::split::Split;
 use crate::adjoint::solve::Definite;
 use crate::dynamics::Evaluation;
+use crate::dynamics::island_matrix::IslandMatrix;
 use crate::dynamics::recoil::{Own, Recoiling};
 use crate::dynamics::tied::{Places, Tied, TiedFactor};
 use crate::{Error, Result};
@@ -31,13 +33,16 @@ impl<'a> Hessian<'a> {
     pub fn new(
         e: &Evaluation<'a>,
         split: &Split,
+        reaction: &Reaction,
         v: &DVector<f64>,
         dt: f64,
         places: &mut Places,
     ) -> Result<Self> {
+        let resisted = reaction.resistance_matrix(v);
+        let resisted = resisted.as_ref();
         let mut factored = |films| match e.mass_blocks().is_whole() {
-            true => dense(e, split, v, dt, films).map(Factor::Dense),
-            false => sparse(e, split, v, dt, films, places).map(Factor::Sparse),
+            true => dense(e, split, resisted, v, dt, films).map(Factor::Dense),
+            false => sparse(e, split, resisted, v, dt, films, places).map(Factor::Sparse),
         };
         let filmed = e.has_films().then(|| factored(true)).flatten();
         let films = filmed.is_some();
@@ -114,11 +119,15 @@ impl Factor {
 fn dense(
     e: &Evaluation,
     split: &Split,
+    resisted: Option<&IslandMatrix>,
     v: &DVector<f64>,
     dt: f64,
     films: bool,
 ) -> Option<Definite> {
-    let m = e.mass_blocks().dense() - dt * e.contact_jacobian(v);
+    let mut m = e.mass_blocks().dense() - dt * e.contact_jacobian(v);
+    if let Some(resisted) = resisted {
+        m -= dt * resisted.dense();
+    }
     let mut m: DMatrix<f64> = 0.5 * (&m + m.transpose());
     if films {
         e.film_masses(|i, j, x| {
@@ -134,6 +143,7 @@ fn dense(
 fn sparse(
     e: &Evaluation,
     split: &Split,
+    resisted: Option<&IslandMatrix>,
     v: &DVector<f64>,
     dt: f64,
     films: bool,
@@ -141,6 +151,16 @@ fn sparse(
 ) -> Option<TiedFactor> {
     let mut matrix = Tied::new(e.mass_blocks(), v.len(), &split.free);
     e.contact_curvature(v, |i, j, x| matrix.add(i, j, dt * x));
+    for (island, block) in resisted.into_iter().flat_map(IslandMatrix::blocks) {
+        for (k, i) in island.iter().enumerate() {
+            for (l, j) in island.iter().enumerate().take(k + 1) {
+                let x = -0.5 * dt * (block[(k, l)] + block[(l, k)]);
+                if x != 0.0 {
+                    matrix.add(*i, *j, x);
+                }
+            }
+        }
+    }
     if films {
         e.film_masses(|i, j, x| matrix.add(i, j, x));
     }

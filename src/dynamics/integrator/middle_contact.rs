@@ -1,18 +1,19 @@
-//! Contact in a step whose forces are those of its middle: solved twice, as for any step ([`super::contact`]).
+//! Limits of joints in a step whose forces are those of its middle: solved twice, as for any step ([`super::contact`]).
 //!
 //! From the velocity v₀ at the step's start and its mean v without contact
 //!
 //! ```text
-//! M (v_s − v) = ½ Δt g(q, v_s)            q⁺ = q ⊕ Δt v_s
+//! M (v_s − v) = ½ Δt G(q, v_s)            q⁺ = q ⊕ Δt v_s
 //! M (v_e − (2v − v₀)) = P + Δt g(q, v_e)  p̂⁺ = p̂ + Δt f + X⁻ᵀ (P + Δt g(q, v_e))
 //! ```
 //!
-//! with P for the force that the motion v_s makes itself rather than v ([`super::motion_push`]).
+//! with P for the force that the motion v_s makes itself rather than v ([`super::motion_push`]), and for what resists it; G is g with that ([`super::reaction`]).
 //! The mean velocity v_s has half of contact's impulse in it, as it has of all other forces', and the velocity v_e at the end the whole: what rests reads as at rest, where the one
 //! problem would leave the half of what presses in its velocity. Both stop at what they meet.
 
 use super::contact::{Problem, pressed, solve, solve_pushed};
 use super::motion_push::{MotionPush, Push};
+use super::reaction::Resisting;
 use super::stages::{ContactVelocities, Stages};
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
@@ -27,17 +28,23 @@ pub(super) fn apply(
 ) -> Result<(State, Stages)> {
     let dt = start.stepper.dt;
     let free = at_end(start, &mean);
-    let after = solve(start, &mean, 0.5 * dt)?;
+    let after = solve(start, &mean, 0.5 * dt, Resisting::InMiddle)?;
     let mut velocities = ContactVelocities::new(mean, after);
-    let end = match MotionPush::new(start, &velocities)? {
-        None => solve(start, &free, dt)?,
+    let end = match MotionPush::new(start, &velocities, Resisting::InMiddle)? {
+        None => solve(start, &free, dt, Resisting::No)?,
         Some(motion) => {
             let push = motion.push(start);
             hat += push.frame;
-            solve_pushed(start, &free, &push.user, dt, &velocities.after)?
+            solve_pushed(
+                start,
+                &free,
+                &push.user,
+                dt,
+                (&velocities.after, Resisting::No),
+            )?
         }
     };
-    let hat = pressed(start, &end, hat);
+    let hat = pressed(start, &free, &end, hat, Resisting::No);
     let next = start.next_state(start.advance(&velocities.after), hat);
     velocities.end = Some(end);
     Ok((next, Stages::Contact(velocities)))
@@ -66,14 +73,14 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         let dt = start.stepper.dt;
         let ContactVelocities { before, after, .. } = velocities;
         let free = at_end(start, before);
-        let motion = MotionPush::new(start, velocities)?;
+        let motion = MotionPush::new(start, velocities, Resisting::InMiddle)?;
         let end = match motion {
-            None => Problem::new(start, &free, velocities.acting(), dt)?,
-            Some(_) => Problem::pushed(start, &free, velocities.acting(), dt)?,
+            None => Problem::new(start, &free, velocities.acting(), dt, Resisting::No)?,
+            Some(_) => Problem::pushed(start, &free, velocities.acting(), dt, Resisting::No)?,
         };
         Ok(Self {
             velocities,
-            mean: Problem::new(start, before, after, 0.5 * dt)?,
+            mean: Problem::new(start, before, after, 0.5 * dt, Resisting::InMiddle)?,
             end,
             motion,
         })
@@ -82,7 +89,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     /// Tangents of [`apply`], from those of the mean velocity and of the momenta before contact.
     pub fn apply_jvp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         along: &StepTangents,
         mean: &DMatrix<f64>,
         mut hat: DMatrix<f64>,
@@ -100,7 +107,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
                 (self.end).solve_pushed_jvp(start, along, &free, &push.user)?
             }
         };
-        let hat = self.end.pressed_jvp(start, along, &end, hat);
+        let hat = self.end.pressed_jvp(start, along, [&free, &end], hat);
         Ok(StateTangents {
             q: start.advance_jvp(&self.velocities.after, along.q, &after),
             y: start.next_momenta(hat),
@@ -110,15 +117,16 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     /// Transpose of [`apply`]: cotangents of the mean velocity and of the momenta before contact; the rest is added to `bar`.
     pub fn apply_vjp(
         &self,
-        start: &Start,
+        start: &Start<'_, 'a>,
         next_bar: &StateBar,
         bar: &mut StepBar,
     ) -> Result<(DVector<f64>, DVector<f64>)> {
         let (q_bar, mut after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
         bar.state.q += q_bar;
         let hat_bar = start.next_momentum_bar(next_bar);
-        let end_bar = self.end.pressed_vjp(start, &hat_bar, bar);
+        let [own_bar, end_bar] = self.end.pressed_vjp(start, &hat_bar, bar);
         let (mut free_bar, user) = self.end.solve_pushed_vjp(start, &end_bar, bar)?;
+        free_bar += own_bar;
         let mut mean_bar = DVector::zeros(hat_bar.len());
         if let Some(motion) = &self.motion {
             let frame = hat_bar.clone();

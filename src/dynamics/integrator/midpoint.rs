@@ -7,10 +7,11 @@
 //! q_m (one evaluation each); the adjoint solves with the transpose of that splitting by GMRES, which gets there wherever the step does, the tangent for all
 //! directions at once.
 //!
-//! Contact is solved at q for the mean velocity and for the one at the end ([`middle_contact`]): the position is stepped implicitly, so that contact is stable at any stiffness, and of
-//! first order. q_m still is on the way that contact hasn't stopped: bodies about to touch may overlap there by half of what they approach in a step.
+//! Limits of joints are solved at q for the mean velocity and for the one at the end ([`middle_contact`]): the position is stepped implicitly, so that they are stable at
+//! any stiffness, and of first order. Where surfaces press, by viscous films too, a step is momentum Euler's ([`super::euler`]). What presses on them acts in the middle of midpoint's step, half of what it moves from
+//! the points at which they bear it, and a body that rolls would be turned by that; nor would the water at q_m know what contact stops.
 
-use super::euler::{Equation, noise, solve_stage};
+use super::euler::{self, Equation, noise, solve_stage};
 use super::middle_contact;
 use super::plan::Halt;
 use super::quasi;
@@ -59,11 +60,17 @@ fn change(e: &Linearisation, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
 
 pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
     let (s, split) = (start.stepper, start.split);
+    // Near to touch: whether they do, by a stage that may fail where nothing presses.
+    if start.near.may_touch()
+        && let Ok(Some(found)) = euler::touching(start, false)
+    {
+        return Ok(found);
+    }
     let p = start.momentum();
     let mut stage = split.complete(start.v);
     if let Some(found) = at_once(start, &p, &stage)? {
         let y = &p + s.dt * found.force;
-        return Ok(middle_contact::apply(start, found.v, y)?);
+        return ends(start, found.v, y);
     }
     let mut previous = f64::INFINITY;
     for _ in 0..ITERATIONS {
@@ -74,7 +81,7 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
         if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
             let y = &p + s.dt * next.force;
-            return Ok(middle_contact::apply(start, stage, y)?);
+            return ends(start, stage, y);
         }
         if moved > 0.5 * previous {
             // Forces that cancel leave rounding, beside which a small velocity doesn't settle.
@@ -82,7 +89,7 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
             let equation = Equation::new(start, &m, &p, rule(s));
             let now = equation.at(stage.clone())?;
             if equation.is_noise(&now) {
-                return Ok(middle_contact::apply(start, now.v, &p + s.dt * now.force)?);
+                return ends(start, now.v, &p + s.dt * now.force);
             }
         }
         previous = moved;
@@ -98,6 +105,20 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
                 .into(),
     }
     .into())
+}
+
+/// The end of a step from its mean velocity and the frame momenta before contact.
+fn ends(
+    start: &Start,
+    mean: DVector<f64>,
+    hat: DVector<f64>,
+) -> std::result::Result<(State, Stages), Halt> {
+    if start.near.touches(&mean)
+        && let Some(found) = euler::touching(start, true)?
+    {
+        return Ok(found);
+    }
+    Ok(middle_contact::apply(start, mean, hat)?)
 }
 
 /// The stage from the guess `v`, if it gets there in v and q_m(v) at once.

@@ -26,6 +26,7 @@ mod motion_push;
 mod pieces;
 mod plan;
 mod quasi;
+mod reaction;
 mod readout;
 mod record;
 mod rule;

@@ -7,16 +7,19 @@
 //! P = Δt (c(q, v_s) − c(q, v*))
 //! ```
 
+use super::reaction::Resisting;
 use super::stages::ContactVelocities;
 use super::start::Start;
 use super::{StepBar, StepTangents};
 use crate::Result;
-use crate::dynamics::slopes::columns;
+use crate::dynamics::Dual;
+use crate::dynamics::slopes::{columns, unit};
 use nalgebra::{DMatrix, DVector};
 
-/// c(q, v_s) − c(q, v*), frame coordinates.
+/// c(q, v_s) − c(q, v*), frame coordinates, with that of what resists motion where contact's problem for the momenta doesn't hold it itself.
 pub(super) struct MotionPush {
     change: DVector<f64>,
+    resisting: Resisting,
 }
 
 /// An impulse as contact's problem takes it, user coordinates, and as the frame momenta do.
@@ -36,13 +39,24 @@ impl MotionPush {
     ///
     /// # Errors
     /// A coupling that fails.
-    pub fn new(start: &Start, velocities: &ContactVelocities) -> Result<Option<Self>> {
+    pub fn new(
+        start: &Start,
+        velocities: &ContactVelocities,
+        resisting: Resisting,
+    ) -> Result<Option<Self>> {
         let ContactVelocities { before, after, .. } = velocities;
-        if start.e.keeps_momenta() || !start.near.contact_acts(before) {
+        let e = start.e;
+        let resistance = resisting.of(start);
+        let still = e.keeps_momenta() && resistance.is_none();
+        if still || !start.near.contact_acts(before) {
             return Ok(None);
         }
-        let change = start.e.motion_force(after)? - start.e.motion_force(before)?;
-        Ok(Some(Self { change }))
+        let mut change = e.motion_force(after)? - e.motion_force(before)?;
+        if let Some(how) = resistance {
+            change += e.resistance(&how, after, Dual::Frame);
+            change -= e.resistance(&how, before, Dual::Frame);
+        }
+        Ok(Some(Self { change, resisting }))
     }
 
     /// P.
@@ -68,7 +82,23 @@ impl MotionPush {
             let slopes = e.motion_force_slopes(v)?;
             Ok(slopes.along(along.q, Some(along_v), along.inputs))
         };
-        let impulse = dt * (at(&velocities.after, after)? - at(&velocities.before, before)?);
+        let mut impulse = dt * (at(&velocities.after, after)? - at(&velocities.before, before)?);
+        if let Some(how) = self.resisting.of(start) {
+            for (sign, v, along_v) in [
+                (dt, &velocities.after, after),
+                (-dt, &velocities.before, before),
+            ] {
+                for i in 0..v.len() {
+                    let row = e.resistance_vjp(&how, v, &unit(v.len(), i), Dual::Frame);
+                    let mut bar = StepBar::zeros(e);
+                    bar.add(sign, &row.force);
+                    bar.v += sign * row.start;
+                    let own = bar.along(along) + sign * along_v.tr_mul(&row.force.v);
+                    let mut to = impulse.row_mut(i);
+                    to += own.transpose();
+                }
+            }
+        }
         let turned = dt * e.frame_momentum_slope(&self.change) * along.q;
         Ok(Push {
             user: columns(&impulse, |p| e.user_momentum(p)) + turned,
@@ -93,9 +123,19 @@ impl MotionPush {
         let had = e.motion_force_vjp(&velocities.before, &change_bar)?;
         bar.add(1.0, &left);
         bar.add(-1.0, &had);
-        Ok(MotionPushBar {
+        let mut out = MotionPushBar {
             before: -had.v,
             after: left.v,
-        })
+        };
+        if let Some(how) = self.resisting.of(start) {
+            let of = |v| e.resistance_vjp(&how, v, &change_bar, Dual::Frame);
+            let (left, had) = (of(&velocities.after), of(&velocities.before));
+            bar.add(1.0, &left.force);
+            bar.add(-1.0, &had.force);
+            bar.v += left.start - had.start;
+            out.after += left.force.v;
+            out.before -= had.force.v;
+        }
+        Ok(out)
     }
 }

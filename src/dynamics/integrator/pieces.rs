@@ -156,7 +156,9 @@ impl<'a> Stepper<'a> {
             Integrator::VelocityEuler => velocity_euler::step(&start)?,
         };
         let passed = match &stages {
-            Stages::Contact(velocities) => self.passed(e, &velocities.after),
+            Stages::Contact(velocities) | Stages::Touching(velocities) => {
+                self.passed(e, &velocities.after)
+            }
             Stages::RungeKutta(_) => Stops::default(),
         };
         let own = stages.contact_velocities();

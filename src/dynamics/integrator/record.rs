@@ -154,7 +154,9 @@ impl<'a> Stepper<'a> {
                 (Stages::Contact(v), Integrator::VelocityEuler) => {
                     Box::new(velocity_euler::Adjoint::new(&start, v)?)
                 }
-                (Stages::Contact(v), _) => Box::new(euler::Adjoint::new(&start, v)?),
+                (Stages::Contact(v) | Stages::Touching(v), _) => {
+                    Box::new(euler::Adjoint::new(&start, v)?)
+                }
             };
             Ok(Part {
                 stepper,

@@ -69,6 +69,8 @@ pub(super) struct Forces {
 pub(super) enum Stages {
     /// Of integrators that solve contact.
     Contact(ContactVelocities),
+    /// Of midpoint where surfaces press: those of momentum Euler.
+    Touching(ContactVelocities),
     RungeKutta(Forces),
 }
 
@@ -76,7 +78,7 @@ impl Stages {
     /// Velocities before and after contact; none of integrators that don't solve it.
     pub fn contact_velocities(&self) -> Option<&ContactVelocities> {
         match self {
-            Self::Contact(velocities) => Some(velocities),
+            Self::Contact(velocities) | Self::Touching(velocities) => Some(velocities),
             Self::RungeKutta(_) => None,
         }
     }

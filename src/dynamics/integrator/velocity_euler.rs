@@ -5,6 +5,7 @@
 //! With contact, v⁺ is what [`contact::solve`] makes of that velocity at q.
 
 use super::contact;
+use super::reaction::Resisting;
 use super::split::When;
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
 use super::start::Start;
@@ -36,7 +37,7 @@ pub(super) fn step(start: &Start) -> Result<(State, Stages)> {
     let (s, split) = (start.stepper, start.split);
     let (a, _) = acceleration(start)?;
     let before = split.complete(&(start.v + s.dt * a));
-    let after = contact::solve(start, &before, s.dt)?;
+    let after = contact::solve(start, &before, s.dt, Resisting::No)?;
     let q = start.advance(&after);
     let next = start.next_state(q, after.clone());
     Ok((next, Stages::Contact(ContactVelocities::new(before, after))))
@@ -60,6 +61,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
                 &velocities.before,
                 &velocities.after,
                 start.stepper.dt,
+                Resisting::No,
             )?,
             velocities,
             acceleration,

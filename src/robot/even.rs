@@ -17,6 +17,11 @@ pub(super) fn is_near(found: usize, asked: usize) -> bool {
     off(found, asked) <= NEAR
 }
 
+/// Part of its volume that a body may lose to so many faces: N between points of a ball cut off 11/N of it, which scaling gives back.
+pub(super) fn lost_by(faces: usize) -> f64 {
+    0.02 + 12.0 / faces as f64
+}
+
 /// The larger one over the smaller one.
 fn off(found: usize, asked: usize) -> f64 {
     let (found, asked) = (found as f64, asked as f64);
@@ -26,8 +31,7 @@ fn off(found: usize, asked: usize) -> f64 {
 /// The same surface with about so many faces and its volume; the nearest that there is where none near that number keeps the shape.
 pub(super) fn even(mesh: &TriMesh, faces: usize, convex: bool) -> TriMesh {
     let volume = mesh.mass_properties().volume;
-    // N faces between points of a ball cut off 11/N of its volume, which scaling gives back.
-    let most = 0.02 + 12.0 / faces as f64;
+    let most = lost_by(faces);
     let kept = |m: &TriMesh| (m.mass_properties().volume / volume - 1.0).abs() < most;
     let good = |m: &TriMesh| kept(m) && is_near(m.faces().len(), faces);
     let own = coarsened(mesh, faces).filter(kept);

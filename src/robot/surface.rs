@@ -1,6 +1,6 @@
 //! What the water sees of a body, and what it touches with.
 
-use super::even::{even, is_near};
+use super::even::{even, is_near, lost_by, of_volume};
 use super::hull::{fine_hull, hull};
 use super::options::Options;
 use super::pieces::{Form, Meshes, Piece, moved};
@@ -15,6 +15,8 @@ use std::path::Path;
 
 /// Faces of hulls and meshes for the water, unless chosen.
 pub(super) const FACES: usize = 320;
+/// Times as many as are asked for that a mesh may have where it would lose its form with less.
+const MORE: [usize; 4] = [2, 4, 8, 16];
 
 /// A closed surface, in the body's frame.
 #[derive(Clone)]
@@ -139,10 +141,12 @@ impl Immersed {
                 let most = options.faces.unwrap_or(FACES);
                 let fewer = match placed.faces().len() > 2 * most {
                     true => coarser(&placed, most),
-                    false => Ok(placed),
+                    false => Ok(placed.clone()),
                 };
                 match fewer {
                     Ok(mesh) => {
+                        tell_faces(name, &placed, &mesh, most, report);
+                        let mesh = of_volume(&mesh, placed.mass_properties().volume);
                         meshes.tell(piece, "closed: used itself", report);
                         let hull = meshes.hull(piece).unwrap_or_else(|error| {
                             report.note(format!(
@@ -277,16 +281,54 @@ impl Immersed {
     }
 }
 
-/// A mesh with about so many faces, or with a few times as many where it would be no surface with so few.
+/// A mesh with about so many faces, or with a few times as many where it would be no surface with so few, or lose its form; if it always does, with the most of these.
 fn coarser(mesh: &TriMesh, most: usize) -> Result<TriMesh> {
-    let first = mesh.coarsened(most);
-    if first.is_ok() {
-        return first;
+    let mut last = mesh.coarsened(most);
+    for times in MORE {
+        if last
+            .as_ref()
+            .is_ok_and(|found| keeps_form(mesh, found, most))
+        {
+            break;
+        }
+        let next = match times * most < mesh.faces().len() {
+            true => mesh.coarsened(times * most),
+            // It has few enough to be used as it is.
+            false if last.is_ok() => Ok(mesh.clone()),
+            false => break,
+        };
+        if next.is_ok() {
+            last = next;
+        }
     }
-    let more = [2 * most, 4 * most].into_iter();
-    let mut more = more.filter(|more| *more < mesh.faces().len());
-    let found = more.find_map(|more| mesh.coarsened(more).ok());
-    found.map_or(first, Ok)
+    last
+}
+
+/// Whether a mesh with about so many faces has the volume that it stands for, but for what that many faces cut off of a body.
+fn keeps_form(mesh: &TriMesh, found: &TriMesh, faces: usize) -> bool {
+    lost(mesh, found).abs() < lost_by(faces)
+}
+
+/// Part of the volume that a mesh lacks.
+fn lost(mesh: &TriMesh, found: &TriMesh) -> f64 {
+    1.0 - found.mass_properties().volume / mesh.mass_properties().volume
+}
+
+/// Says where a surface has more faces than are asked for, and where it lost its form.
+fn tell_faces(name: &str, mesh: &TriMesh, found: &TriMesh, asked: usize, report: &mut Report) {
+    let (lost, faces) = (lost(mesh, found), found.faces().len());
+    if lost.abs() >= lost_by(asked) {
+        report.warn(format!(
+            "body {name:?}: its mesh of {} faces lost {:.1} % of its volume as it was given {faces}, and was scaled to have it again: its form isn't kept; \
+             ask for more (`faces`)",
+            mesh.faces().len(),
+            100.0 * lost
+        ));
+    } else if faces > asked && !is_near(faces, asked) && faces < mesh.faces().len() {
+        report.note(format!(
+            "body {name:?}: its surface has {faces} faces, where {asked} are asked for (`faces`): with about that many it would lose its form"
+        ));
+    }
 }
 
 fn body(name: &str) -> String {

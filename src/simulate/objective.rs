@@ -1,6 +1,6 @@
 //! Scalars of a trajectory and their derivatives with respect to what is observed.
 
-use super::observable::{differentiable, observable};
+use super::observable::{self, differentiable, observable};
 use super::part::{Part, Partwise};
 use super::{Cotangents, Gradient, Rollout, Sensor};
 use crate::{Error, Result};
@@ -220,9 +220,7 @@ impl Partwise for Sum {
 
 /// Tangent index of coordinate `q[index]`, if its joint has plain coordinates.
 fn tangent_of(rollout: &Rollout, index: usize) -> Option<usize> {
-    let links = rollout.simulator().system().tree.links();
-    let link = links.iter().find(|l| l.q.contains(&index))?;
-    (link.q.len() == link.v.len()).then(|| link.v.start + index - link.q.start)
+    observable::tangent_of("q", rollout.simulator().system(), index).ok()?
 }
 
 impl Term {
@@ -328,14 +326,14 @@ impl Objective for Sum {
                     let rows: usize = observable(name)?.shape(system).iter().product();
                     let found = differentiable(name)?;
                     rollout.reads(name, found)?;
-                    if found.tangents(system) != rows {
+                    below("entry", *entry, rows)?;
+                    if observable::tangent_of(name, system, *entry)?.is_none() {
                         return Err(Error::input(
                             "objective: observable",
-                            name,
-                            "must have a value whose entries are independent, without quaternions or rotation matrices",
+                            format!("entry {entry} of {name}"),
+                            "must be an entry that moves by itself, no part of the place of a joint that turns in three dimensions or of a rotation matrix",
                         ));
                     }
-                    below("entry", *entry, rows)?;
                 }
                 Of::Body(body) => drop(body.found("objective", rollout)?),
                 Of::Flow(_) | Of::Pressure(_) => {
@@ -410,7 +408,9 @@ impl Objective for Sum {
                     let rows = differentiable(name).map_or(0, |t| t.tangents(system));
                     let bars = out.observables.entry(name.clone());
                     let bars = bars.or_insert_with(|| DMatrix::zeros(rows, columns));
-                    (bars, *entry)
+                    let own = observable::tangent_of(name, system, *entry);
+                    let Ok(Some(entry)) = own else { continue };
+                    (bars, entry)
                 }
                 Of::Controls => {
                     out.controls += 2.0 * term.weight * rollout.controls();

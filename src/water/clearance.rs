@@ -212,6 +212,9 @@ impl Clearance {
     /// What to do about bodies that get into one another by `depth`, m.
     fn part(&self, depth: f64, hint: &str) -> String {
         match self.contact {
+            true if !hint.is_empty() => format!(
+                "they overlap by {depth:.3e} m, where the water can't be solved, and one carries the other, between which contact doesn't act: give the joint `limits`{hint}"
+            ),
             true => format!(
                 "they overlap by {depth:.3e} m, where the water can't be solved: raise \
                  contact.stiffness or contact.gap, or take a smaller time step"

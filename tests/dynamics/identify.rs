@@ -6,6 +6,7 @@ use hydrograd::optimize::{
     Experiment, Identified, IdentifySettings, IdentifyStop, Loss, Recorded, Unknown, identify,
 };
 use hydrograd::scene::{Body, Damping, Fluid, Motion, Scene, Shape};
+use hydrograd::simulate::Objective as _;
 use hydrograd::{Controls, Fidelity, Joint, Settings, Simulator};
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;
@@ -714,4 +715,77 @@ fn an_inertia_stays_physical() {
     says(refused, &["top.inertia.root.xx", "top.inertia.yy", "root"]);
     let nobody = run(tumbled(truth, ball, 0.0), &Unknown::inertia("nobody")).unwrap_err();
     says(nobody, &["nobody.inertia.xx"]);
+}
+
+/// What an encoder tells of a joint on a vehicle that floats, whose place is no plain number: the joint's coordinate itself.
+#[test]
+fn encoders_of_floating_robots_tell() {
+    let made = |damping: f64| {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.time_step = 0.02;
+        let hull = Shape::ellipsoid([0.2, 0.15, 0.12]).faces(80);
+        scene.add(Body::new(hull).named("hull").density(998.0));
+        let axis = [0.0, 1.0, 0.0];
+        let arm = Body::new(Shape::ellipsoid([0.12, 0.03, 0.03]).faces(80));
+        let arm = arm.named("arm").child_of("hull").density(1400.0);
+        let passive = hydrograd::scene::Passive::default().damping(damping);
+        scene.add(
+            arm.at([0.35, 0.0, 0.0])
+                .joint(Joint::Revolute { axis })
+                .passive(passive.stiffness(0.5)),
+        );
+        scene.initial.v = vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0];
+        let settings = Settings::default().fidelity(Fidelity::Isolated);
+        Simulator::new(&scene, settings).unwrap()
+    };
+    let simulator = made(0.02);
+    let controls = Controls::zeros(&simulator, 60);
+    let rollout = simulator.rollout(&controls).unwrap();
+    let states: Vec<usize> = (1..=60).collect();
+    let seen = |entry: usize| Recorded {
+        observable: "q".into(),
+        entry,
+        states: states.clone(),
+        values: states
+            .iter()
+            .map(|n| rollout.samples()[*n].q[entry])
+            .collect(),
+        deviation: 1e-3,
+    };
+    let run = |entry| Experiment::new("swing", made(0.05), controls.clone()).saw(seen(entry));
+    let unknowns = [Unknown::new("arm.joint.damping").positive()];
+    // Of few residuals by a reverse sweep for each, of many by forward mode.
+    for few in [false, true] {
+        let settings = IdentifySettings::default();
+        let go = |_: &_| ControlFlow::Continue(());
+        let mut recorded = seen(7);
+        if few {
+            recorded.states = vec![20];
+            recorded.values = vec![rollout.samples()[20].q[7]];
+        }
+        let swing = Experiment::new("swing", made(0.05), controls.clone()).saw(recorded);
+        let found = identify(&[swing], &unknowns, &settings, go).unwrap();
+        let damping = found.unknowns[0].value;
+        assert!((damping / 0.02 - 1.0).abs() < 1e-6, "{damping}");
+        // The hull's place is no plain number.
+        for part in [0, 3] {
+            let refused = identify(&[run(part)], &unknowns, &settings, go).unwrap_err();
+            says(refused, &["entry", "three dimensions", "attitudes"]);
+        }
+    }
+    // And in an objective.
+    let objective = hydrograd::objective::mean_observable("q", 7, 0.1, 1.0);
+    let value = |damping: f64| {
+        let rollout = made(damping).rollout(&controls).unwrap();
+        objective.value(&rollout)
+    };
+    let found = rollout.gradient(&objective).unwrap();
+    let found = found.parameters.get("arm.joint.damping").unwrap();
+    let difference = (value(0.02 + 1e-6) - value(0.02 - 1e-6)) / 2e-6;
+    assert!(
+        (found / difference - 1.0).abs() < 1e-6,
+        "{found} for {difference}"
+    );
+    let place = hydrograd::objective::mean_observable("q", 4, 0.1, 1.0);
+    says(rollout.gradient(&place).unwrap_err(), &["three dimensions"]);
 }

@@ -419,3 +419,36 @@ fn closed_meshes_are_told_as_that() {
     assert!(!said.contains("isn't a closed"), "{said}");
     says(with(600).bodies[0].shape.as_str(), &["closed mesh"]);
 }
+
+/// A closed mesh keeps its volume with the faces that it is given; where its form isn't kept, that is said.
+#[test]
+fn closed_meshes_keep_their_volume() {
+    let mesh = collision("<mesh filename=\"bowl.obj\"/>", "");
+    let (folder, path) = file(&robot(&link("a", &mesh)));
+    std::fs::write(folder.path().join("bowl.obj"), bowl()).unwrap();
+    let with = |faces: usize| {
+        let options = Robot {
+            faces: Some(faces),
+            ..Robot::default()
+        };
+        options.inspect(&path, &Fluid::fresh_water()).unwrap()
+    };
+    let whole = with(1536).volume;
+    for faces in [60, 100, 160, 320, 640] {
+        let report = with(faces);
+        let said = report.to_string();
+        println!(
+            "{faces}: {} of it, {}",
+            report.volume / whole,
+            report.bodies[0].shape
+        );
+        if report.bodies[0].shape.contains("closed mesh") {
+            assert!(
+                (report.volume / whole - 1.0).abs() < 1e-9,
+                "{faces}: {said}"
+            );
+        } else {
+            says(&said, &["convex hull of its mesh"]);
+        }
+    }
+}

@@ -209,13 +209,6 @@ impl Observed {
                 "must be read from one state, and this is the mean over a step: take `velocities`, or the controls' `change`",
             ));
         }
-        if found.tangents(system) != rows {
-            return Err(Error::input(
-                format!("{place}: name"),
-                format!("{:?}", self.name),
-                "must have a value whose entries are independent, without quaternions or rotation matrices: take `configuration` or `orientation`",
-            ));
-        }
         if self.entries.is_empty() || self.entries.iter().any(|e| *e >= rows) {
             return Err(Error::input(
                 format!("{place}: entries"),
@@ -224,6 +217,15 @@ impl Observed {
                     "must be at least one, each under {rows}, the number of the observable's entries"
                 ),
             ));
+        }
+        for entry in &self.entries {
+            if observable::tangent_of(&self.name, system, *entry)?.is_none() {
+                return Err(Error::input(
+                    format!("{place}: entries"),
+                    format!("{entry} of {:?}", self.name),
+                    "must move by itself, and be no part of the place of a joint that turns in three dimensions or of a rotation matrix: take `configuration` or `orientation`",
+                ));
+            }
         }
         Ok(())
     }
@@ -245,7 +247,10 @@ impl Residual for Observed {
 
     fn jacobian(&self, at: &CostPoint) -> Result<(DVector<f64>, DMatrix<f64>)> {
         let (all, jacobian) = at.rollout.observable_jacobian(&self.name, at.state)?;
-        let rows: Vec<_> = self.entries.iter().map(|e| jacobian.row(*e)).collect();
+        let system = at.rollout.simulator().system();
+        let tangent = |e: &usize| Ok(observable::tangent_of(&self.name, system, *e)?.unwrap_or(*e));
+        let tangents: Vec<usize> = self.entries.iter().map(tangent).collect::<Result<_>>()?;
+        let rows: Vec<_> = tangents.iter().map(|t| jacobian.row(*t)).collect();
         Ok((self.miss(at, &all)?, DMatrix::from_rows(&rows)))
     }
 }

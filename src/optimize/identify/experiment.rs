@@ -1,7 +1,7 @@
 //! One recording, and what is simulated in its place.
 
 use super::derived::Derived;
-use crate::simulate::observable::{differentiable, observable};
+use crate::simulate::observable::{differentiable, observable, tangent_of};
 use crate::simulate::{Controls, Rollout, Simulator};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -144,10 +144,14 @@ impl Experiment {
         }
         for r in &self.recorded {
             let place = |field: &str| place(&format!("{:?}: {field}", r.observable));
-            let entries = self.entries(&r.observable);
+            let entries = self.values(&r.observable);
             let entries = entries.map_err(|e| e.within(&place("observable")))?;
             if r.entry >= entries {
                 let remedy = format!("must be under {entries}, counted from 0");
+                return Err(Error::input(place("entry"), r.entry, remedy));
+            }
+            if self.tangent_of(r)?.is_none() {
+                let remedy = "must be an entry that moves by itself, no part of the place of a joint that turns in three dimensions: take \"positions\" and \"attitudes\" for those";
                 return Err(Error::input(place("entry"), r.entry, remedy));
             }
             if r.states.len() != r.values.len() {
@@ -168,6 +172,22 @@ impl Experiment {
             }
         }
         Ok(())
+    }
+
+    /// Number of entries of an observable with derivatives.
+    fn values(&self, name: &str) -> Result<usize> {
+        differentiable(name)?;
+        let shape = observable(name)?.shape(self.simulator.system());
+        Ok(shape.iter().product())
+    }
+
+    /// The tangent of the observable by which what was recorded moves.
+    pub(super) fn tangent_of(&self, recorded: &Recorded) -> Result<Option<usize>> {
+        tangent_of(
+            &recorded.observable,
+            self.simulator.system(),
+            recorded.entry,
+        )
     }
 
     /// Number of entries of an observable, each of which moves by a tangent of its own.

@@ -480,9 +480,10 @@ impl<'a> Misfit<'a> {
         for r in recorded {
             let of = names.binary_search(&r.observable.as_str()).unwrap_or(0);
             let entries = made[of].nrows() / states.len();
+            let tangent = self.experiments[k].tangent_of(r)?.unwrap_or(r.entry);
             for n in &r.states {
                 let place = states.binary_search(n).unwrap_or(0);
-                let found = made[of].row(place * entries + r.entry) / r.deviation;
+                let found = made[of].row(place * entries + tangent) / r.deviation;
                 out.row_mut(row).copy_from(&found);
                 row += 1;
             }
@@ -497,10 +498,11 @@ impl<'a> Misfit<'a> {
         let mut rows = Vec::new();
         for r in &self.experiments[k].recorded {
             let entries = differentiable(&r.observable)?;
+            let tangent = self.experiments[k].tangent_of(r)?.unwrap_or(r.entry);
             for state in &r.states {
                 let mut bar = rollout.zero_cotangents();
                 let mut seed = DMatrix::zeros(entries.tangents(system), rollout.steps() + 1);
-                seed[(r.entry, *state)] = 1.0 / r.deviation;
+                seed[(tangent, *state)] = 1.0 / r.deviation;
                 bar.observables.insert(r.observable.clone(), seed);
                 let found = rollout.vjp(&bar)?;
                 let mut row = Vec::new();

@@ -60,6 +60,11 @@ pub trait Differentiable: Sync {
         false
     }
 
+    /// Of an observable that hasn't as many entries as its tangents: which of these an entry moves by, if that is one of its own.
+    fn tangent_of(&self, _system: &System, _entry: usize) -> Option<usize> {
+        None
+    }
+
     /// Its tangent as the state moves.
     fn jvp(&self, at: &Observed, along: &ObservedTangents) -> Vec<f64>;
 

@@ -38,6 +38,12 @@ impl Differentiable for Coordinates {
         system.tree.velocities()
     }
 
+    fn tangent_of(&self, system: &System, entry: usize) -> Option<usize> {
+        let mut links = system.tree.links().iter();
+        let link = links.find(|l| l.q.contains(&entry))?;
+        (link.q.len() == link.v.len()).then(|| link.v.start + entry - link.q.start)
+    }
+
     fn jvp(&self, _: &Observed, along: &ObservedTangents) -> Vec<f64> {
         along.q.to_vec()
     }

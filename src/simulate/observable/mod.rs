@@ -20,6 +20,7 @@ pub use entry::{Differentiable, Observable, Observed, ObservedBars, ObservedTang
 
 pub(super) use acceleration::without_steps;
 
+use crate::dynamics::System;
 use crate::{Error, Result};
 use frames::Of;
 
@@ -62,6 +63,19 @@ pub fn observable(name: &str) -> Result<&'static dyn Observable> {
             format!("{name:?}"),
             format!("must be one of {names:?}"),
         )
+    })
+}
+
+/// The tangent by which an entry of the observable of this name moves, which is that entry's alone; none of a quaternion's, or a rotation matrix's.
+///
+/// # Errors
+/// As [`differentiable`].
+pub fn tangent_of(name: &str, system: &System, entry: usize) -> Result<Option<usize>> {
+    let found = differentiable(name)?;
+    let entries: usize = observable(name)?.shape(system).iter().product();
+    Ok(match found.tangents(system) == entries {
+        true => Some(entry),
+        false => found.tangent_of(system, entry),
     })
 }
 

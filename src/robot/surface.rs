@@ -16,7 +16,9 @@ use std::path::Path;
 /// Faces of hulls and meshes for the water, unless chosen.
 pub(super) const FACES: usize = 320;
 /// Times as many as are asked for that a mesh may have where it would lose its form with less.
-const MORE: [usize; 4] = [2, 4, 8, 16];
+const MORE: [usize; 6] = [2, 4, 8, 16, 32, 64];
+/// Most faces of a mesh that is used as it is where it can't have less.
+const MOST: usize = 20_000;
 
 /// A closed surface, in the body's frame.
 #[derive(Clone)]
@@ -293,8 +295,7 @@ fn coarser(mesh: &TriMesh, most: usize) -> Result<TriMesh> {
         }
         let next = match times * most < mesh.faces().len() {
             true => mesh.coarsened(times * most),
-            // It has few enough to be used as it is.
-            false if last.is_ok() => Ok(mesh.clone()),
+            false if mesh.faces().len() <= MOST => Ok(mesh.clone()),
             false => break,
         };
         if next.is_ok() {

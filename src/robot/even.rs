@@ -52,7 +52,8 @@ pub(super) fn even(mesh: &TriMesh, faces: usize, convex: bool) -> TriMesh {
         (_, Some(laid)) if good(laid) => Some(laid),
         _ => None,
     };
-    let all = [own.as_ref(), laid.as_ref(), Some(mesh)];
+    let split = split(mesh, faces);
+    let all = [own.as_ref(), laid.as_ref(), Some(&split), Some(mesh)];
     let nearest = all.into_iter().flatten().min_by(|a, b| {
         let [a, b] = [a, b].map(|m| off(m.faces().len(), faces));
         a.total_cmp(&b)
@@ -82,6 +83,15 @@ fn shapeliness(mesh: &TriMesh) -> f64 {
     (0..mesh.faces().len())
         .map(of)
         .fold(f64::INFINITY, f64::min)
+}
+
+/// Faces are cut in four until they are half as many or more.
+fn split(mesh: &TriMesh, faces: usize) -> TriMesh {
+    let mut fine = mesh.clone();
+    while 2 * fine.faces().len() < faces {
+        fine = fine.split();
+    }
+    fine
 }
 
 /// Edges are taken away from the surface itself.

@@ -38,6 +38,13 @@ pub(super) enum Form {
     Mesh(Rc<Loaded>),
 }
 
+/// A closed mesh as it is, or turned round.
+pub(super) struct Own {
+    pub mesh: TriMesh,
+    /// Whether its normals pointed inward.
+    pub turned: bool,
+}
+
 /// A mesh in a file, scaled.
 pub(super) struct Loaded {
     pub path: PathBuf,
@@ -269,22 +276,35 @@ impl<'f> Meshes<'f> {
         Ok(loaded)
     }
 
-    /// The surface of a mesh itself, if nothing is wrong with it; else why it isn't used, or the error if such are refused.
+    /// The surface of a mesh itself, if nothing is wrong with it or it is inside out; else why it isn't used, or the error if such are refused.
     pub fn surface(
         &self,
         link: usize,
         loaded: &Loaded,
         options: &Options,
-    ) -> Result<std::result::Result<TriMesh, String>> {
+    ) -> Result<std::result::Result<Own, String>> {
         let mesh = loaded.mesh.clone();
-        match mesh.into_mesh() {
-            Ok(mesh) => Ok(Ok(mesh)),
-            Err(error) if options.bad_meshes == BadMeshes::Refuse => {
-                Err(error.of(&link_place(self.file, link)))
+        let error = match mesh.into_mesh() {
+            Ok(mesh) => {
+                return Ok(Ok(Own {
+                    mesh,
+                    turned: false,
+                }));
             }
-            Err(Error::Mesh { problem, .. }) => Ok(Err(problem)),
-            Err(error) => Ok(Err(error.to_string())),
+            Err(error) => error,
+        };
+        if options.bad_meshes == BadMeshes::Refuse {
+            return Err(error.of(&link_place(self.file, link)));
         }
+        let mut other = loaded.mesh.clone();
+        other.faces.iter_mut().for_each(|f| f.swap(1, 2));
+        if let Ok(mesh) = other.into_mesh() {
+            return Ok(Ok(Own { mesh, turned: true }));
+        }
+        Ok(Err(match error {
+            Error::Mesh { problem, .. } => problem,
+            error => error.to_string(),
+        }))
     }
 
     /// As [`Piece::hull`], with an error that names the link.

@@ -3,7 +3,7 @@
 use super::even::{even, is_near, lost_by, of_volume};
 use super::hull::{fine_hull, hull};
 use super::options::Options;
-use super::pieces::{Form, Meshes, Piece, moved};
+use super::pieces::{Form, Meshes, Own, Piece, moved};
 use super::report::Report;
 use super::tree::Group;
 use crate::geometry::{MassProperties, Solid, TriMesh};
@@ -133,7 +133,7 @@ impl Immersed {
             Form::Mesh(loaded) => loaded,
         };
         let why = match meshes.surface(piece.link, loaded, options)? {
-            Ok(mesh) => {
+            Ok(Own { mesh, turned }) => {
                 let vertices: Vec<Vec3> = mesh
                     .vertices()
                     .iter()
@@ -149,7 +149,11 @@ impl Immersed {
                     Ok(mesh) => {
                         tell_faces(name, &placed, &mesh, most, report);
                         let mesh = of_volume(&mesh, placed.mass_properties().volume);
-                        meshes.tell(piece, "closed: used itself", report);
+                        let used_as = match turned {
+                            true => "closed: used itself, turned right side out",
+                            false => "closed: used itself",
+                        };
+                        meshes.tell(piece, used_as, report);
                         let hull = meshes.hull(piece).unwrap_or_else(|error| {
                             report.note(format!(
                                 "body {name:?}: its mesh itself is for contact, since it has no convex hull: {error}"
@@ -179,7 +183,7 @@ impl Immersed {
                     }
                 }
             }
-            Err(why) => format!("it isn't a closed surface: {why}"),
+            Err(why) => format!("it is no sound closed surface: {why}"),
         };
         let made = Self::of_pieces(meshes, std::slice::from_ref(piece), name, options, report)?;
         if made.surface.is_some() {
@@ -273,8 +277,12 @@ impl Immersed {
                 *mesh = even(mesh, wanted, *convex);
                 let found = mesh.faces().len();
                 if !is_near(found, wanted) {
+                    let why = match found > wanted {
+                        true => "with about that many it would lose its form",
+                        false => "its faces aren't divided evenly into more",
+                    };
                     report.note(format!(
-                        "body {name:?}: its surface has {found} faces, where {wanted} are asked for (`faces`): with about that many it would lose its form"
+                        "body {name:?}: its surface has {found} faces, where {wanted} are asked for (`faces`): {why}"
                     ));
                 }
             }

@@ -448,3 +448,24 @@ fn closed_meshes_keep_their_volume() {
         }
     }
 }
+
+/// A closed mesh whose faces all point inward is turned round, not laid in its hull.
+#[test]
+fn meshes_inside_out_are_turned_round() {
+    let mesh = collision("<mesh filename=\"bowl.obj\"/>", "");
+    let (folder, path) = file(&robot(&link("a", &mesh)));
+    let with = |text: String| {
+        std::fs::write(folder.path().join("bowl.obj"), text).unwrap();
+        let report = Robot::default().inspect(&path, &Fluid::fresh_water());
+        report.unwrap()
+    };
+    let right = with(bowl(0.9));
+    let turn = |line: &str| match line.split(' ').collect::<Vec<_>>()[..] {
+        ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+        _ => format!("{line}\n"),
+    };
+    let turned = with(bowl(0.9).lines().map(turn).collect());
+    assert!((turned.volume / right.volume - 1.0).abs() < 1e-9);
+    says(&turned.to_string(), &["turned right side out"]);
+    assert!(!right.to_string().contains("turned right side out"));
+}

@@ -466,6 +466,6 @@ fn meshes_inside_out_are_turned_round() {
     };
     let turned = with(bowl(0.9).lines().map(turn).collect());
     assert!((turned.volume / right.volume - 1.0).abs() < 1e-9);
-    says(&turned.to_string(), &["turned right side out"]);
+    says(turned.to_string(), &["turned right side out"]);
     assert!(!right.to_string().contains("turned right side out"));
 }

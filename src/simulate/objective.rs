@@ -331,7 +331,7 @@ impl Objective for Sum {
                         return Err(Error::input(
                             "objective: observable",
                             format!("entry {entry} of {name}"),
-                            "must be an entry that moves by itself, no part of the place of a joint that turns in three dimensions or of a rotation matrix",
+                            "must be independent of the other entries, no part of the place of a joint that turns in three dimensions or of a rotation matrix",
                         ));
                     }
                 }

@@ -165,16 +165,7 @@ impl Evaluation<'_> {
     ) {
         let at = self.moving(twists, v, control);
         let bars = bars.iter_mut().zip(out);
-        let mut bars: Vec<LoadBars> = bars
-            .map(|(bar, out)| LoadBars {
-                pose: &mut bar.pose,
-                twist: &mut bar.twist,
-                q: &mut out.q,
-                v: &mut out.v,
-                control: &mut out.control,
-                parameters: &mut out.parameters,
-            })
-            .collect();
+        let mut bars: Vec<LoadBars> = bars.map(|(bar, out)| out.bars(bar)).collect();
         for force in self.system.smooth_forces() {
             force.vjps(&at, z, &mut bars, by_parameters);
         }

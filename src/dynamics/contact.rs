@@ -4,6 +4,8 @@ use super::{ContactLaws, Parameter, Parameters};
 use crate::adjoint::contact::{ContactBar, Law, PointState, Rates, positive};
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, point_velocity, point_wrench, six};
 use crate::contact::{ContactPair, ContactPoint, Contacts};
+use crate::multibody::Virtual;
+use nalgebra::DVector;
 use serde::Serialize;
 
 /// Which surfaces may touch, and how.
@@ -218,4 +220,14 @@ pub enum Dual {
     User,
     /// The frame momenta's.
     Frame,
+}
+
+impl Dual {
+    /// A velocity that generalised forces of these coordinates do work on.
+    pub(super) fn virtual_velocity(self, z: &DVector<f64>) -> Virtual<'_> {
+        match self {
+            Self::User => Virtual::User(z),
+            Self::Frame => Virtual::Frame(z),
+        }
+    }
 }

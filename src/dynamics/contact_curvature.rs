@@ -29,16 +29,7 @@ impl Evaluation<'_> {
             }
         }
         if self.damps() {
-            for (island, block) in self.damping_matrix().blocks() {
-                for (k, i) in island.iter().enumerate() {
-                    for (l, j) in island.iter().enumerate().take(k + 1) {
-                        let x = -0.5 * (block[(k, l)] + block[(l, k)]);
-                        if x != 0.0 {
-                            add(*i, *j, x);
-                        }
-                    }
-                }
-            }
+            self.damping_matrix().lower(|i, j, x| add(i, j, -x));
         }
         for l in &self.limits {
             add(l.v, l.v, -l.forces_jvp(self.q[l.q], v[l.v], 1.0));

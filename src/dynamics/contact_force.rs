@@ -12,7 +12,7 @@ use crate::Result;
 use crate::adjoint::contact::{Push, contact_force, contact_force_jvp, contact_force_vjp};
 use crate::adjoint::lie::{Pose, Vec6, angular, point_velocity};
 use crate::contact::{ContactPair, ContactPoint};
-use crate::multibody::{Cotangents, Virtual};
+use crate::multibody::Cotangents;
 use nalgebra::DVector;
 
 /// Contacts at places where surfaces are near, of bodies that end a step with these twists: all where something presses, or where
@@ -98,6 +98,14 @@ impl Evaluation<'_> {
         out
     }
 
+    /// Of the velocities, spatial.
+    pub(super) fn columns(&self, dual: Dual) -> &[Vec6] {
+        match dual {
+            Dual::User => &self.kinematics.columns,
+            Dual::Frame => &self.kinematics.frame_columns,
+        }
+    }
+
     fn twists(&self, v: &DVector<f64>) -> Vec<Vec6> {
         self.system.tree.twists(&self.kinematics, v)
     }
@@ -132,11 +140,7 @@ impl Evaluation<'_> {
         let twists = self.twists(v);
         let mut wrenches = self.exchanged(|t| contact_force(&t.law, &t.point_state(&twists)));
         self.add_damping(&twists, v, &mut wrenches);
-        let columns = match dual {
-            Dual::User => &self.kinematics.columns,
-            Dual::Frame => &self.kinematics.frame_columns,
-        };
-        let mut out = tree.project(columns, wrenches);
+        let mut out = tree.project(self.columns(dual), wrenches);
         for (limit, [lower, upper]) in self.limit_forces(v) {
             out[limit.v] += lower + upper;
         }
@@ -209,10 +213,7 @@ impl Evaluation<'_> {
         dual: Dual,
     ) -> ForceCotangents {
         let tree = &self.system.tree;
-        let virtual_velocity = match dual {
-            Dual::User => Virtual::User(z),
-            Dual::Frame => Virtual::Frame(z),
-        };
+        let virtual_velocity = dual.virtual_velocity(z);
         let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
         let mut bar = Cotangents::zeros(self.system.len());
         let mut out = ForceCotangents::zeros(self);

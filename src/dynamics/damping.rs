@@ -1,6 +1,6 @@
 //! Forces that are solved with contact at the end of a step ([`ForceModel::solved_with_contact`]).
 
-use super::force::{CoarseGap, ForceModel, LoadBars, Loads, Velocity, coarser};
+use super::force::{CoarseGap, ForceModel, Loads, Velocity, coarser};
 use super::{Evaluation, ForceCotangents};
 use crate::Result;
 use crate::adjoint::lie::Vec6;
@@ -83,15 +83,8 @@ impl Evaluation<'_> {
             v: z,
         };
         self.dampers(|force, control| {
-            let mut bars = LoadBars {
-                pose: &mut bar.pose,
-                twist: &mut bar.twist,
-                q: &mut out.q,
-                v: &mut out.v,
-                control: &mut out.control,
-                parameters: &mut out.parameters,
-            };
-            force.vjp(&self.moving(&fields.twist, v, control), &power, &mut bars);
+            let at = self.moving(&fields.twist, v, control);
+            force.vjp(&at, &power, &mut out.bars(bar));
         });
     }
 }

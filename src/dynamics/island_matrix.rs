@@ -93,6 +93,20 @@ impl IslandMatrix {
         })
     }
 
+    /// Hands `add` the entries of its symmetric part on and below the diagonal: row, column, value.
+    pub fn lower(&self, mut add: impl FnMut(usize, usize, f64)) {
+        for (island, block) in self.blocks() {
+            for (k, i) in island.iter().enumerate() {
+                for (l, j) in island.iter().enumerate().take(k + 1) {
+                    let x = 0.5 * (block[(k, l)] + block[(l, k)]);
+                    if x != 0.0 {
+                        add(*i, *j, x);
+                    }
+                }
+            }
+        }
+    }
+
     /// The block of each island on the rows and columns of its velocities that are free, with their numbers among the free ones, which ascend.
     pub fn free_blocks<'b>(
         &'b self,

@@ -11,7 +11,7 @@
 //! nothing changes its sign, and what a small a changes is of second order in Δt, as the method's own error. a is that of each joint at rest at the start of
 //! a run, by all that the joint moves, up to the next power of two: a constant of the run, which gradients don't follow, and the same for scenes that differ by little.
 
-use super::force::{ForceModel, LoadBars, Loads, Moving, Velocity};
+use super::force::{ForceModel, Loads, Moving, Velocity};
 use super::{Drive, Evaluation, ForceCotangents, Parameters, System};
 use crate::Result;
 use nalgebra::DVector;
@@ -103,24 +103,12 @@ impl Evaluation<'_> {
         out.joints
     }
 
-    fn late_loads_vjp(
-        &self,
-        v: &DVector<f64>,
-        control: &DVector<f64>,
-        z: &DVector<f64>,
-    ) -> ForceCotangents {
+    /// Transpose of what they do to joints that move so.
+    pub(super) fn late_loads_vjp(&self, at: &Moving, z: &DVector<f64>) -> ForceCotangents {
         let mut out = ForceCotangents::zeros(self);
-        let at = self.joints(v, control);
         let power = Velocity { twists: &[], v: z };
-        let mut bars = LoadBars {
-            pose: &mut [],
-            twist: &mut [],
-            q: &mut out.q,
-            v: &mut out.v,
-            control: &mut out.control,
-            parameters: &mut out.parameters,
-        };
-        (self.system.late_forces()).for_each(|f| f.vjp(&at, &power, &mut bars));
+        let mut bars = out.joint_bars();
+        (self.system.late_forces()).for_each(|f| f.vjp(at, &power, &mut bars));
         out
     }
 
@@ -155,8 +143,8 @@ impl Evaluation<'_> {
         control: &DVector<f64>,
         z: &DVector<f64>,
     ) -> LateBars {
-        let mut there = self.late_loads_vjp(&late.velocity, control, z);
-        let mean = self.late_loads_vjp(late.mean, control, z);
+        let mut there = self.late_loads_vjp(&self.joints(&late.velocity, control), z);
+        let mean = self.late_loads_vjp(&self.joints(late.mean, control), z);
         let start = -self.system.late.component_mul(&there.v);
         there.q -= &mean.q;
         there.v -= &mean.v + &start;

@@ -6,11 +6,10 @@
 //!
 //! Midpoint takes those of joints at the configuration of its middle, and late ([`super::late`]); so does R.
 
-use super::force::{ForceModel, LoadBars, Loads, Moving, Place, Velocity};
+use super::force::{ForceModel, Loads, Moving, Place, Velocity};
 use super::island_matrix::IslandMatrix;
 use super::{Dual, Evaluation, ForceCotangents, System};
-use crate::adjoint::lie::Vec6;
-use crate::multibody::{Cotangents, Virtual};
+use crate::multibody::Cotangents;
 use nalgebra::DVector;
 
 /// How such forces are taken in a step.
@@ -87,75 +86,33 @@ impl Evaluation<'_> {
         let joints = self.late_joints(how, v);
         let at = self.moving_joints(&joints, how.control);
         (self.system.late_forces()).for_each(|f| f.add(&at, &mut loads));
-        let columns = match dual {
-            Dual::User => &self.kinematics.columns,
-            Dual::Frame => &self.kinematics.frame_columns,
-        };
         // Joints with one coordinate have the same force in every frame.
-        tree.project(columns, loads.wrenches) + loads.joints
+        tree.project(self.columns(dual), loads.wrenches) + loads.joints
     }
 
     /// Of the forces of joints, each one's derivative by its own velocity.
     fn late_resistance_slopes(&self, how: &Resistance, v: &DVector<f64>) -> DVector<f64> {
         let joints = self.late_joints(how, v);
         let ones = DVector::repeat(v.len(), 1.0);
-        let bars = self.late_resistance_vjp(how, &joints, &ones);
-        let mut out = bars.v;
-        if let Some((_, reach)) = how.middle {
-            if !self.system.late.is_empty() {
-                out += self.system.late.component_mul(&out);
-            }
-            out += reach * bars.q;
+        let bars = self.late_loads_vjp(&self.moving_joints(&joints, how.control), &ones);
+        match how.middle {
+            None => bars.v,
+            Some((_, reach)) => reach * bars.q + self.delayed(&bars.v) + bars.v,
         }
-        out
     }
 
-    /// Where they are taken.
-    fn late_resistance_vjp(
-        &self,
-        how: &Resistance,
-        joints: &Joints,
-        z: &DVector<f64>,
-    ) -> ForceCotangents {
-        let mut out = ForceCotangents::zeros(self);
-        let power = Velocity { twists: &[], v: z };
-        let at = self.moving_joints(joints, how.control);
-        let mut bars = LoadBars {
-            pose: &mut [],
-            twist: &mut [],
-            q: &mut out.q,
-            v: &mut out.v,
-            control: &mut out.control,
-            parameters: &mut out.parameters,
-        };
-        (self.system.late_forces()).for_each(|f| f.vjp(&at, &power, &mut bars));
-        out
+    /// w of each velocity times its entry of `x`.
+    fn delayed(&self, x: &DVector<f64>) -> DVector<f64> {
+        match self.system.late.is_empty() {
+            true => DVector::zeros(x.len()),
+            false => self.system.late.component_mul(x),
+        }
     }
 
     /// ∂R/∂v in the user's coordinates: symmetric, negative semi-definite.
     pub(super) fn resistance_matrix(&self, how: &Resistance, v: &DVector<f64>) -> IslandMatrix {
-        let (tree, islands) = (&self.system.tree, self.resisted_islands());
-        let changes = islands.changes();
-        let twists = tree.twists(&self.kinematics, v);
-        let along: Vec<Vec<Vec6>> = (changes.iter())
-            .map(|dv| tree.twists(&self.kinematics, dv))
-            .collect();
-        let velocities: Vec<Velocity> = (changes.iter().zip(&along))
-            .map(|(v, twists)| Velocity { twists, v })
-            .collect();
-        let mut loads: Vec<Loads> = (changes.iter())
-            .map(|_| Loads::zeros(twists.len(), v.len()))
-            .collect();
-        let at = self.moving(&twists, v, how.control);
-        (self.system.resisting()).for_each(|f| f.jvps(&at, &velocities, &mut loads));
-        let joints = self.late_resistance_slopes(how, v);
-        let products: Vec<_> = (loads.into_iter().zip(&changes))
-            .map(|(loads, dv)| {
-                tree.project(&self.kinematics.columns, loads.wrenches)
-                    + loads.joints
-                    + joints.component_mul(dv)
-            })
-            .collect();
+        let islands = self.resisted_islands();
+        let products = self.resistance_jvps(how, v, &islands.changes());
         IslandMatrix::new(islands, &products)
     }
 
@@ -166,19 +123,23 @@ impl Evaluation<'_> {
         v: &DVector<f64>,
         dv: &DVector<f64>,
     ) -> DVector<f64> {
-        let tree = &self.system.tree;
-        let [twists, along] = [v, dv].map(|v| tree.twists(&self.kinematics, v));
-        let mut loads = Loads::zeros(twists.len(), v.len());
-        let (at, change) = (
-            self.moving(&twists, v, how.control),
-            Velocity {
-                twists: &along,
-                v: dv,
-            },
-        );
-        (self.system.resisting()).for_each(|f| f.jvp(&at, &change, &mut loads));
-        let joints = self.late_resistance_slopes(how, v).component_mul(dv);
-        tree.project(&self.kinematics.columns, loads.wrenches) + loads.joints + joints
+        self.resistance_jvps(how, v, std::slice::from_ref(dv))
+            .swap_remove(0)
+    }
+
+    /// Its tangents along all `changes`.
+    fn resistance_jvps(
+        &self,
+        how: &Resistance,
+        v: &DVector<f64>,
+        changes: &[DVector<f64>],
+    ) -> Vec<DVector<f64>> {
+        let mut out = self.load_rates(self.system.resisting(), v, how.control, changes);
+        let joints = self.late_resistance_slopes(how, v);
+        for (out, dv) in out.iter_mut().zip(changes) {
+            *out += joints.component_mul(dv);
+        }
+        out
     }
 
     /// Transpose of [`Evaluation::resistance`]: the gradient of zᵀ R.
@@ -189,11 +150,7 @@ impl Evaluation<'_> {
         z: &DVector<f64>,
         dual: Dual,
     ) -> ResistanceBars {
-        let tree = &self.system.tree;
-        let virtual_velocity = match dual {
-            Dual::User => Virtual::User(z),
-            Dual::Frame => Virtual::Frame(z),
-        };
+        let (tree, virtual_velocity) = (&self.system.tree, dual.virtual_velocity(z));
         let fields = tree.fields(&self.kinematics, &self.q, v, virtual_velocity);
         let mut bar = Cotangents::zeros(self.system.len());
         let mut out = ForceCotangents::zeros(self);
@@ -205,38 +162,25 @@ impl Evaluation<'_> {
         };
         for force in self.system.resisting() {
             force.add(&at, &mut loads);
-            let mut bars = LoadBars {
-                pose: &mut bar.pose,
-                twist: &mut bar.twist,
-                q: &mut out.q,
-                v: &mut out.v,
-                control: &mut out.control,
-                parameters: &mut out.parameters,
-            };
-            force.vjp(&at, &power, &mut bars);
+            force.vjp(&at, &power, &mut out.bars(&mut bar));
         }
         bar.virtual_twist = loads.wrenches;
         let (q_bar, v_bar) = tree.reverse(&self.kinematics, v, virtual_velocity, &fields, bar);
         out.q += q_bar;
         out.v += v_bar;
-        let late = self.late_resistance_vjp(how, &self.late_joints(how, v), z);
+        let joints = self.late_joints(how, v);
+        let late = self.late_loads_vjp(&self.moving_joints(&joints, how.control), z);
         let mut start = DVector::zeros(v.len());
         match how.middle {
-            None => {
-                out.q += late.q;
-                out.v += late.v;
-            }
+            None => out.q += late.q,
             Some((_, reach)) => {
                 let (q_bar, xi_bar) = tree.integrate_vjp(&(reach * v), &late.q);
+                start -= self.delayed(&late.v);
                 out.q += q_bar;
-                out.v += reach * xi_bar + &late.v;
-                if !self.system.late.is_empty() {
-                    let more = self.system.late.component_mul(&late.v);
-                    out.v += &more;
-                    start = -more;
-                }
+                out.v += reach * xi_bar - &start;
             }
         }
+        out.v += late.v;
         out.control += late.control;
         out.parameters.add(&late.parameters);
         ResistanceBars { force: out, start }

@@ -4,7 +4,7 @@
 //! that nothing drives. Of many bodies that are coupled by products M is what each tree has alone.
 
 use super::fluid::FluidMomenta;
-use super::force::{Loads, Velocity};
+use super::force::{ForceModel, Loads, Velocity};
 use super::{Drive, Evaluation, Parameters, System};
 use crate::Result;
 use nalgebra::{DMatrix, DVector};
@@ -66,7 +66,7 @@ impl Evaluation<'_> {
         }
         let islands = self.islands();
         let changes = islands.changes();
-        let slowed = self.load_rates(v, control, &changes);
+        let slowed = self.load_rates(self.system.smooth_forces(), v, control, &changes);
         if slowed.iter().all(|column| column.iter().all(|x| *x == 0.0)) {
             return Ok(None);
         }
@@ -95,9 +95,10 @@ impl Evaluation<'_> {
         Ok(found)
     }
 
-    /// ∂g/∂v of the forces that act in the course of a step, times `changes`; user coordinates.
-    fn load_rates(
+    /// ∂g/∂v of these forces, times `changes`; user coordinates.
+    pub(super) fn load_rates<'f>(
         &self,
+        forces: impl Iterator<Item = &'f dyn ForceModel>,
         v: &DVector<f64>,
         control: &DVector<f64>,
         changes: &[DVector<f64>],
@@ -114,7 +115,7 @@ impl Evaluation<'_> {
             .collect();
         let twists = tree.twists(&self.kinematics, v);
         let at = self.moving(&twists, v, control);
-        for force in self.system.smooth_forces() {
+        for force in forces {
             force.jvps(&at, &velocities, &mut out);
         }
         let columns = out.into_iter();

@@ -277,13 +277,7 @@ impl Immersed {
                 *mesh = even(mesh, wanted, *convex);
                 let found = mesh.faces().len();
                 if !is_near(found, wanted) {
-                    let why = match found > wanted {
-                        true => "with about that many it would lose its form",
-                        false => "its faces aren't divided evenly into more",
-                    };
-                    report.note(format!(
-                        "body {name:?}: its surface has {found} faces, where {wanted} are asked for (`faces`): {why}"
-                    ));
+                    tell_count(name, found, wanted, report);
                 }
             }
             self.said = format!("{}, {} faces", self.said, mesh.faces().len());
@@ -334,10 +328,19 @@ fn tell_faces(name: &str, mesh: &TriMesh, found: &TriMesh, asked: usize, report:
             100.0 * lost
         ));
     } else if faces > asked && !is_near(faces, asked) && faces < mesh.faces().len() {
-        report.note(format!(
-            "body {name:?}: its surface has {faces} faces, where {asked} are asked for (`faces`): with about that many it would lose its form"
-        ));
+        tell_count(name, faces, asked, report);
     }
+}
+
+/// Says that a surface hasn't about as many faces as are asked for, and why.
+fn tell_count(name: &str, found: usize, asked: usize, report: &mut Report) {
+    let why = match found > asked {
+        true => "with about that many it would lose its form",
+        false => "its faces aren't divided evenly into more",
+    };
+    report.note(format!(
+        "body {name:?}: its surface has {found} faces, where {asked} are asked for (`faces`): {why}"
+    ));
 }
 
 fn body(name: &str) -> String {

@@ -59,7 +59,7 @@ fn gradients_of_the_costs() {
 /// Grasps with random forces, gaps filled by films: none fails, in the coupling or otherwise, whatever closes on what. A thousand: `cargo bench --bench contact -- grasps`.
 #[test]
 fn random_grasps_never_fail() {
-    let count = 6;
+    let count = 8;
     let scene = task::load().unwrap();
     let mut simulator = task::simulator(&scene, task::RESOLVED).unwrap();
     simulator.set_policy(Box::new(OpenLoop));

@@ -239,7 +239,7 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::reaction::Reaction::force_vjp",
     ),
     (
-        "dynamics::resistance::Evaluation::late_resistance_vjp",
+        "dynamics::integrator::reaction::Resisted::force_vjp",
         "dynamics::integrator::reaction::Reaction::force_vjp",
     ),
     (

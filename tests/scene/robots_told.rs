@@ -365,7 +365,10 @@ fn motions_that_nothing_tells_apart_are_refused() {
 
 /// A bowl, its inside so wide as part of its outside: closed, and with few faces inside and outside cross.
 fn bowl(inner: f64) -> String {
-    let (around, along) = (24_usize, 16_usize);
+    bowl_of(24, 16, inner)
+}
+
+fn bowl_of(around: usize, along: usize, inner: f64) -> String {
     let inwards = (1..=along).map(|k| (1.0, k));
     let back = (1..=along).rev().map(|k| (inner, k));
     let mut text = String::from("v 0 0 1\n");
@@ -468,4 +471,28 @@ fn meshes_inside_out_are_turned_round() {
     assert!((turned.volume / right.volume - 1.0).abs() < 1e-9);
     says(turned.to_string(), &["turned right side out"]);
     assert!(!right.to_string().contains("turned right side out"));
+}
+
+/// Of a closed mesh of very many faces that can't be had with few the hull stands for it, and that isn't laid to its not being closed.
+#[test]
+fn closed_meshes_too_fine_to_keep_are_told_as_that() {
+    let mesh = collision("<mesh filename=\"bowl.obj\"/>", "");
+    let (folder, path) = file(&robot(&link("a", &mesh)));
+    std::fs::write(folder.path().join("bowl.obj"), bowl_of(96, 60, 0.9995)).unwrap();
+    let options = Robot {
+        faces: Some(20),
+        ..Robot::default()
+    };
+    let said = options.inspect(&path, &Fluid::fresh_water()).unwrap();
+    let said = said.to_string();
+    says(
+        &said,
+        &[
+            "convex hull of its mesh",
+            "it is closed, but has 23040 faces",
+            "with about 20 (`faces`)",
+            "pass through each other",
+        ],
+    );
+    assert!(!said.contains("closed surface"), "{said}");
 }

@@ -69,7 +69,7 @@ pub(super) fn solve(
 ) -> Result<DVector<f64>> {
     let still = DVector::zeros(before.len());
     match start.near.contact_acts(before) {
-        true => solve_pushed(start, before, &still, dt, (before, resisting)),
+        true => solve_pushed(start, before, &still, dt, before, resisting),
         // At no force v* is the least of the convex problem.
         false => start.near.check_damping().map(|()| before.clone()),
     }
@@ -81,7 +81,8 @@ pub(super) fn solve_pushed(
     before: &DVector<f64>,
     push: &DVector<f64>,
     dt: f64,
-    (guess, resisting): (&DVector<f64>, Resisting),
+    guess: &DVector<f64>,
+    resisting: Resisting,
 ) -> Result<DVector<f64>> {
     let (e, split) = (start.near, start.split);
     e.check_damping()?;
@@ -97,9 +98,10 @@ pub(super) fn solve_pushed(
     let in_water = Cell::new(0.0);
     let at = |v: DVector<f64>, moved: Option<DVector<f64>>, behind: Vec<f64>| {
         let moved = moved.unwrap_or_else(|| e.mass_times(&(&v - before)));
-        let imbalance = &moved - push - dt * reaction.force(&v, Dual::User);
+        let [force, effort] = reaction.force_and_effort(&v);
+        let imbalance = &moved - push - dt * force;
         let size = sized(&summands.times(&v.abs())).max(least);
-        let size = size.max(dt * sized(&reaction.effort(&v)));
+        let size = size.max(dt * sized(&effort));
         let lacking = share(
             behind.iter().map(|x| x * x).sum::<f64>().sqrt(),
             in_water.get(),
@@ -306,10 +308,8 @@ impl<'a> Problem<'a> {
         let pressed = reaction.slopes(&self.after, Dual::User, &split.free);
         let inertia = e.mass_slopes(&change, &split.free, along.inputs.has_parameters())?;
         let moved = columns(before, |v| e.mass_times(v));
-        let reacted = pressed.force.along(along.q, None, along.inputs)
-            + pressed.before * before
-            + pressed.start * along.v;
-        let right = moved + push + self.time * reacted - inertia.along(along.q, None, along.inputs);
+        let right = moved + push + self.time * pressed.along(along, before, None)
+            - inertia.along(along.q, None, along.inputs);
         let mut after = before.clone();
         let free = hessian.solve_columns(&split.take_rows(&right));
         e.check()?;
@@ -372,9 +372,7 @@ impl<'a> Problem<'a> {
         }
         let reaction = self.reaction(start);
         let slopes = reaction.slopes(&self.after, Dual::Frame, &start.split.free);
-        let pressed = (slopes.force).along(along.q, Some(after), along.inputs)
-            + slopes.before * before
-            + slopes.start * along.v;
+        let pressed = slopes.along(along, before, Some(after));
         let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
         hat + columns(&pressed, |g| drift.carry(dt, dt * g))
     }

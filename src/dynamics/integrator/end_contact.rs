@@ -30,7 +30,8 @@ pub(super) fn apply(
             &velocities.before,
             &push.user,
             dt,
-            (&velocities.after, Resisting::AtStart),
+            &velocities.after,
+            Resisting::AtStart,
         )?);
         hat += push.frame;
     }

@@ -268,17 +268,28 @@ fn free(start: &Start) -> std::result::Result<(DVector<f64>, DVector<f64>), Halt
     Ok((stage.v, p + s.dt * stage.force))
 }
 
-/// The step, if surfaces press in it, of an integrator that leaves those to this one; also where they don't, with `always`.
-pub(super) fn touching(
+/// The step of an integrator that leaves those in which surfaces press to this one.
+pub(super) fn touching_step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
+    let (v, hat) = free(start)?;
+    touching(start, v, hat)
+}
+
+/// The same, if surfaces press in it.
+pub(super) fn touching_step_if_any(
     start: &Start,
-    always: bool,
 ) -> std::result::Result<Option<(State, Stages)>, Halt> {
     let (v, hat) = free(start)?;
-    if !always && !start.near.touches(&v) {
-        return Ok(None);
-    }
+    let presses = start.near.touches(&v);
+    presses.then(|| touching(start, v, hat)).transpose()
+}
+
+fn touching(
+    start: &Start,
+    v: DVector<f64>,
+    hat: DVector<f64>,
+) -> std::result::Result<(State, Stages), Halt> {
     let (next, velocities) = end_contact::apply(start, v, hat)?;
-    Ok(Some((next, Stages::Touching(velocities))))
+    Ok((next, Stages::Touching(velocities)))
 }
 
 /// The same, whose energy is closed.

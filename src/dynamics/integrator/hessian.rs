@@ -1,4 +1,5 @@
-//! The Hessian M + Δt Jᵀ G J of the problem of contact on the free velocities, with what resists motion beside it, factored: as one matrix of a few velocities and of bodies that feel each other through
+//! The Hessian M + Δt Jᵀ G J of the problem of contact on the free velocities, with what resists motion beside it, factored: as one matrix of a few velocities and of bodies that feel each
+//! other through
 //! the water, else as a sparse one, in an order of elimination in which bodies that touch many others come last. Many bodies that are coupled by products press in what is
 //! theirs alone, films between them weighing with it, and all of that recoils in what else they exchange.
 
@@ -151,15 +152,8 @@ fn sparse(
 ) -> Option<TiedFactor> {
     let mut matrix = Tied::new(e.mass_blocks(), v.len(), &split.free);
     e.contact_curvature(v, |i, j, x| matrix.add(i, j, dt * x));
-    for (island, block) in resisted.into_iter().flat_map(IslandMatrix::blocks) {
-        for (k, i) in island.iter().enumerate() {
-            for (l, j) in island.iter().enumerate().take(k + 1) {
-                let x = -0.5 * dt * (block[(k, l)] + block[(l, k)]);
-                if x != 0.0 {
-                    matrix.add(*i, *j, x);
-                }
-            }
-        }
+    if let Some(resisted) = resisted {
+        resisted.lower(|i, j, x| matrix.add(i, j, -dt * x));
     }
     if films {
         e.film_masses(|i, j, x| matrix.add(i, j, x));

@@ -40,7 +40,8 @@ pub(super) fn apply(
                 &free,
                 &push.user,
                 dt,
-                (&velocities.after, Resisting::No),
+                &velocities.after,
+                Resisting::No,
             )?
         }
     };

@@ -8,8 +8,8 @@
 //! directions at once.
 //!
 //! Limits of joints are solved at q for the mean velocity and for the one at the end ([`middle_contact`]): the position is stepped implicitly, so that they are stable at
-//! any stiffness, and of first order. Where surfaces press, by viscous films too, a step is momentum Euler's ([`super::euler`]). What presses on them acts in the middle of midpoint's step, half of what it moves from
-//! the points at which they bear it, and a body that rolls would be turned by that; nor would the water at q_m know what contact stops.
+//! any stiffness, and of first order. Where surfaces press, by viscous films too, a step is momentum Euler's ([`super::euler`]). What presses on them acts in the middle of midpoint's step,
+//! half of what it moves from the points at which they bear it, and a body that rolls would be turned by that; nor would the water at q_m know what contact stops.
 
 use super::euler::{self, Equation, noise, solve_stage};
 use super::middle_contact;
@@ -62,7 +62,7 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
     let (s, split) = (start.stepper, start.split);
     // Near to touch: whether they do, by a stage that may fail where nothing presses.
     if start.near.may_touch()
-        && let Ok(Some(found)) = euler::touching(start, false)
+        && let Ok(Some(found)) = euler::touching_step_if_any(start)
     {
         return Ok(found);
     }
@@ -113,10 +113,8 @@ fn ends(
     mean: DVector<f64>,
     hat: DVector<f64>,
 ) -> std::result::Result<(State, Stages), Halt> {
-    if start.near.touches(&mean)
-        && let Some(found) = euler::touching(start, true)?
-    {
-        return Ok(found);
+    if start.near.touches(&mean) {
+        return euler::touching_step(start);
     }
     Ok(middle_contact::apply(start, mean, hat)?)
 }

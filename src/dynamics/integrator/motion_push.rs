@@ -7,13 +7,13 @@
 //! P = Δt (c(q, v_s) − c(q, v*))
 //! ```
 
-use super::reaction::Resisting;
+use super::reaction::{Resisted, Resisting};
 use super::stages::ContactVelocities;
 use super::start::Start;
 use super::{StepBar, StepTangents};
 use crate::Result;
 use crate::dynamics::Dual;
-use crate::dynamics::slopes::{columns, unit};
+use crate::dynamics::slopes::columns;
 use nalgebra::{DMatrix, DVector};
 
 /// c(q, v_s) − c(q, v*), frame coordinates, with that of what resists motion where contact's problem for the momenta doesn't hold it itself.
@@ -46,17 +46,24 @@ impl MotionPush {
     ) -> Result<Option<Self>> {
         let ContactVelocities { before, after, .. } = velocities;
         let e = start.e;
-        let resistance = resisting.of(start);
-        let still = e.keeps_momenta() && resistance.is_none();
+        let resisted = Resisted::new(start, before, resisting);
+        let still = e.keeps_momenta() && resisted.is_none();
         if still || !start.near.contact_acts(before) {
             return Ok(None);
         }
         let mut change = e.motion_force(after)? - e.motion_force(before)?;
-        if let Some(how) = resistance {
-            change += e.resistance(&how, after, Dual::Frame);
-            change -= e.resistance(&how, before, Dual::Frame);
+        if let Some(resisted) = resisted {
+            change += resisted.force(after, Dual::Frame);
         }
         Ok(Some(Self { change, resisting }))
+    }
+
+    fn resisted<'r, 'a>(
+        &self,
+        start: &Start<'r, 'a>,
+        velocities: &'r ContactVelocities,
+    ) -> Option<Resisted<'r, 'a>> {
+        Resisted::new(start, &velocities.before, self.resisting)
     }
 
     /// P.
@@ -83,21 +90,9 @@ impl MotionPush {
             Ok(slopes.along(along.q, Some(along_v), along.inputs))
         };
         let mut impulse = dt * (at(&velocities.after, after)? - at(&velocities.before, before)?);
-        if let Some(how) = self.resisting.of(start) {
-            for (sign, v, along_v) in [
-                (dt, &velocities.after, after),
-                (-dt, &velocities.before, before),
-            ] {
-                for i in 0..v.len() {
-                    let row = e.resistance_vjp(&how, v, &unit(v.len(), i), Dual::Frame);
-                    let mut bar = StepBar::zeros(e);
-                    bar.add(sign, &row.force);
-                    bar.v += sign * row.start;
-                    let own = bar.along(along) + sign * along_v.tr_mul(&row.force.v);
-                    let mut to = impulse.row_mut(i);
-                    to += own.transpose();
-                }
-            }
+        if let Some(resisted) = self.resisted(start, velocities) {
+            let slopes = resisted.slopes(&velocities.after, Dual::Frame);
+            impulse += dt * slopes.along(along, before, Some(after));
         }
         let turned = dt * e.frame_momentum_slope(&self.change) * along.q;
         Ok(Push {
@@ -127,14 +122,12 @@ impl MotionPush {
             before: -had.v,
             after: left.v,
         };
-        if let Some(how) = self.resisting.of(start) {
-            let of = |v| e.resistance_vjp(&how, v, &change_bar, Dual::Frame);
-            let (left, had) = (of(&velocities.after), of(&velocities.before));
-            bar.add(1.0, &left.force);
-            bar.add(-1.0, &had.force);
-            bar.v += left.start - had.start;
-            out.after += left.force.v;
-            out.before -= had.force.v;
+        if let Some(resisted) = self.resisted(start, velocities) {
+            let own = resisted.force_vjp(&velocities.after, &change_bar, Dual::Frame);
+            bar.add(1.0, &own.force);
+            bar.v += own.start;
+            out.after += own.force.v;
+            out.before += own.before;
         }
         Ok(out)
     }

@@ -194,7 +194,7 @@ impl Experiment {
     fn entries(&self, name: &str) -> Result<usize> {
         let system = self.simulator.system();
         let entries = differentiable(name)?.tangents(system);
-        let values: usize = observable(name)?.shape(system).iter().product();
+        let values = self.values(name)?;
         match values == entries {
             true => Ok(entries),
             false => Err(Error::input(

@@ -309,9 +309,11 @@ def inspect_robot(
     actuated: bool | None = None,
     limits: bool | None = None,
     drag: Drag | None = None,
+    servo: Servo | None = None,
     start: dict[str, float] | None = None,
     motions: dict[str, Motion | Sequence[Motion]] | None = None,
     zeros: dict[str, float] | None = None,
+    joints: dict[str, dict[str, Any]] | None = None,
     links: dict[str, dict[str, Any]] | None = None,
 ) -> dict[str, Any]:
     """What a robot in a URDF file comes to in water of `density` (kg/m³): tree, masses, weight against buoyancy, meshes that were replaced, and what of the file wasn't
@@ -357,9 +359,11 @@ class Scene:
         actuated: bool | None = None,
         limits: bool | None = None,
         drag: Drag | None = None,
+        servo: Servo | None = None,
         start: dict[str, float] | None = None,
         motions: dict[str, Motion | Sequence[Motion]] | None = None,
         zeros: dict[str, float] | None = None,
+        joints: dict[str, dict[str, Any]] | None = None,
         links: dict[str, dict[str, Any]] | None = None,
     ) -> Scene:
         """A scene of the robot in a URDF or MJCF file, in still fresh water, gravity along -z. Choices are those of `add_robot`."""
@@ -379,15 +383,17 @@ class Scene:
         actuated: bool | None = None,
         limits: bool | None = None,
         drag: Drag | None = None,
+        servo: Servo | None = None,
         start: dict[str, float] | None = None,
         motions: dict[str, Motion | Sequence[Motion]] | None = None,
         zeros: dict[str, float] | None = None,
+        joints: dict[str, dict[str, Any]] | None = None,
         links: dict[str, dict[str, Any]] | None = None,
     ) -> Robot:
         """Adds the robot of a URDF or MJCF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
         or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
-        `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `motions`
-        (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,
+        `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `servo` (of all joints that are controls), `start` (joint to coordinate), `motions`
+        (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `joints` (joint to its `actuated`, `servo`, `passive`, `limits`, `limit_stiffness`), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `drag`, `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,
         `added_mass`, `overlaps_parent`)."""
     def to_toml(self) -> str:
         """The scene as TOML text, from which `from_toml` makes an equal one."""

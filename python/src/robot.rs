@@ -1,6 +1,6 @@
 //! Robots in URDF files.
 
-use crate::body::Drag;
+use crate::body::{Drag, Passive, Servo};
 use crate::error::input;
 use crate::interrupt::light;
 use crate::joint::Motion;
@@ -21,10 +21,30 @@ fn not_a_choice(why: impl std::fmt::Display) -> PyErr {
     )
 }
 
+/// What `json` doesn't know, as a scene file has it: drag, passive forces and servos by their keys, arrays as lists, mappings as dictionaries, paths as text.
+#[pyfunction]
+fn written<'py>(py: Python<'py>, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if let Ok(drag) = given.cast::<Drag>() {
+        return to_dict(py, serde_json::to_string(&drag.get().0));
+    }
+    if let Ok(passive) = given.cast::<Passive>() {
+        return to_dict(py, serde_json::to_string(&passive.get().0));
+    }
+    if let Ok(servo) = given.cast::<Servo>() {
+        return to_dict(py, serde_json::to_string(&servo.get().0));
+    }
+    if given.hasattr("tolist")? {
+        return given.call_method0("tolist");
+    }
+    match given.hasattr("keys")? {
+        true => py.get_type::<PyDict>().call1((given,)),
+        false => Ok(given.str()?.into_any()),
+    }
+}
+
 /// The choices as a scene file has them.
 fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrograd::scene::Robot> {
     let plain = PyDict::new(py);
-    let mut drag = None;
     let mut motions: BTreeMap<String, Vec<hydrograd::scene::Motion>> = BTreeMap::new();
     if let Some(given) = given {
         for (key, value) in given {
@@ -47,29 +67,22 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
                 let remedy = "leave it out: the file is the first argument, `path`";
                 return Err(input("robot: urdf", value.repr()?, remedy));
             }
-            let is_drag = key.eq("drag")?;
-            match value.cast::<Drag>() {
-                Ok(found) if is_drag => drag = Some(found.get().0),
-                _ => plain.set_item(&key, &value)?,
-            }
+            plain.set_item(&key, &value)?;
         }
     }
-    // Arrays as lists, mappings as dictionaries, paths as text.
-    let code = c"lambda x: x.tolist() if hasattr(x, 'tolist') else dict(x) if hasattr(x, 'keys') else str(x)";
     let options = PyDict::new(py);
-    options.set_item("default", py.eval(code, None, None)?)?;
+    options.set_item("default", wrap_pyfunction!(written, py)?)?;
     let json = py
         .import("json")?
         .call_method("dumps", (plain,), Some(&options));
     let text: String = json.map_err(not_a_choice)?.extract()?;
     let mut robot: hydrograd::scene::Robot = serde_json::from_str(&text).map_err(not_a_choice)?;
-    robot.drag = drag.or(robot.drag);
     robot.motions = motions;
     Ok(robot)
 }
 
-fn to_dict<'py>(py: Python<'py>, report: &RobotReport) -> PyResult<Bound<'py, PyAny>> {
-    let text = serde_json::to_string(report).map_err(not_a_choice)?;
+fn to_dict<'py>(py: Python<'py>, text: serde_json::Result<String>) -> PyResult<Bound<'py, PyAny>> {
+    let text = text.map_err(not_a_choice)?;
     py.import("json")?.call_method1("loads", (text,))
 }
 
@@ -98,7 +111,7 @@ impl Robot {
     /// What it came to, as `inspect_robot` gives it.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        to_dict(py, &self.report)
+        to_dict(py, serde_json::to_string(&self.report))
     }
 
     fn __repr__(&self) -> String {
@@ -160,5 +173,5 @@ pub fn inspect_robot<'py>(
         ..Fluid::fresh_water()
     };
     let report = light(py, || robot.inspect(path, &fluid))?;
-    to_dict(py, &report)
+    to_dict(py, serde_json::to_string(&report))
 }

@@ -93,8 +93,8 @@ impl Scene {
 
     /// Adds the robot of a URDF or MJCF file: a body for each link that moves, a site for each that doesn't. Choices are the keys of a scene file's [[robot]]: `base` "free"
     /// or "fixed", `position` (m) and `rotation` (rad) of the root, `prefix` of all names, `package_path` (folders), `shape` "collision", "visual", "hull" or "none",
-    /// `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `start` (joint to coordinate), `motions`
-    /// (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,
+    /// `bad_meshes` "hull" or "refuse", `faces` of hulls, `mimic` "follow" or "independent", `actuated`, `limits`, `drag`, `servo` (of all joints that are controls), `start` (joint to coordinate), `motions`
+    /// (joint to the `Motion` that drives it), `zeros` (joint whose zero isn't sure to its offset, the coordinate of a body "JOINT zero" before it), `joints` (joint to its `actuated`, `servo`, `passive`, `limits`, `limit_stiffness`), `links` (link to its `shape`, `mass`, `density`, `keep`, and what `Body` takes: `drag`, `center_of_mass`, `inertia`, `volume`, `center_of_buoyancy`,
     /// `added_mass`, `overlaps_parent`).
     #[pyo3(signature = (path, **choices))]
     fn add_robot(

@@ -352,3 +352,29 @@ def test_an_mjcf_file_is_pinocchios(tmp_path):
         full = np.triu(full) + np.triu(full, 1).T
         close(equations.mass_matrix(), full[np.ix_(at, at)])
         close(equations.bias_force(v), pin.rnea(model, data, there, rate, np.zeros(4))[at])
+
+
+def test_joints_and_links_are_as_chosen():
+    """Drives, losses and drag of single joints and links: as objects, as mappings, for all and for one."""
+    path = ROOT / "examples" / "rov.urdf"
+    chosen = dict(
+        servo=hg.Servo(5.0, 0.5),
+        joints={
+            "arm_elbow": {"servo": {"stiffness": 8.0}, "passive": hg.Passive(damping=0.2)},
+            "arm_shoulder": {"actuated": False, "limits": np.array([-0.5, 0.5])},
+        },
+        links={"hand": {"drag": hg.Drag(quadratic=0.5)}},
+    )
+    scene = hg.Scene.from_urdf(path, **chosen)
+    text = scene.to_toml()
+    joints = hg.Scene.from_urdf(path).add_robot(path, prefix="again/", position=(5, 0, 0)).joints
+    assert {"arm_elbow", "arm_shoulder"} <= set(joints)
+    assert text.count("stiffness = 8.0") == 1 and text.count("stiffness = 5.0") == len(joints) - 2
+    assert text.count("damping = 0.2") == 1 and text.count("quadratic = 0.5") == 1
+    assert "limits = [-0.5, 0.5]" in text
+    sim = hg.Simulator(scene, fidelity="isolated")
+    assert sim.control_size == len(joints) - 1
+    with pytest.raises(hg.InputError, match="no such name"):
+        hg.Scene.from_urdf(path, joints={"elbow": {"servo": hg.Servo(1.0)}})
+    with pytest.raises(hg.InputError, match="strength"):
+        hg.Scene.from_urdf(path, joints={"arm_elbow": {"strength": 1.0}})

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::exit::Exit;
-use super::options::RobotArguments;
+use super::options::{RobotArguments, positive};
 use super::output::Output;
 use crate::scene::{Fluid, RobotReport};
 use crate::{Error, Result};
@@ -19,6 +19,9 @@ pub(super) struct Arguments {
     file: PathBuf,
     #[command(flatten)]
     robot: RobotArguments,
+    /// Faces of hulls, of meshes that have more than twice as many, and of shapes by formula [default: 320, of shapes their own].
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    faces: Option<usize>,
     /// Density of the water in kg/m³ [default: 998; a scene's own].
     #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
     density: Option<f64>,
@@ -51,7 +54,11 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
             let right = "a scene file says it in its `fluid`: leave it out";
             return Err(Error::input("--density", density, right));
         }
-        let scene = arguments.robot.scene(file)?;
+        if let Some(faces) = arguments.faces {
+            let right = "a scene file says it in its [[robot]]: leave it out";
+            return Err(Error::input("--faces", faces, right));
+        }
+        let scene = arguments.robot.scene(file, None)?;
         let robots = scene.imports.reports();
         if robots.is_empty() {
             let right = "give a scene with a [[robot]], or a robot's file";
@@ -67,7 +74,10 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
         return Err(Error::input("--density", density, right));
     }
     let fluid = Fluid { density, ..water };
-    let report = arguments.robot.robot().inspect(file, &fluid)?;
+    let report = arguments
+        .robot
+        .robot(arguments.faces)
+        .inspect(file, &fluid)?;
     output.result(&report);
     Ok(Exit::Done)
 }

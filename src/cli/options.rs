@@ -51,8 +51,8 @@ pub(super) struct Water {
     /// Norm in which the rows of the boundary condition are fitted [default: scaled; unscaled with the preset paper].
     #[arg(long, value_parser = choice::<RowScaling>())]
     pub rows: Option<RowScaling>,
-    /// Faces per body, for shapes by formula; the nearest number that the shape allows is taken
-    /// [default: the scene's own, else 1280].
+    /// Faces per body, for shapes by formula and the hulls of a robot's file; the nearest number that the shape allows is taken
+    /// [default: the scene's own, else 1280, of hulls 320].
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     pub faces: Option<usize>,
     /// Choices to start from [default: the scene's own, else default].
@@ -126,8 +126,8 @@ pub(super) struct RobotArguments {
 }
 
 impl RobotArguments {
-    /// The choices.
-    pub fn robot(&self) -> Robot {
+    /// The choices, with so many faces.
+    pub fn robot(&self, faces: Option<usize>) -> Robot {
         Robot {
             base: self.base,
             package_path: self.package_path.clone(),
@@ -135,14 +135,15 @@ impl RobotArguments {
             mimic: self.mimic.unwrap_or_default(),
             bad_meshes: self.bad_meshes.unwrap_or_default(),
             limits: self.no_limits.then_some(false),
+            faces,
             ..Robot::default()
         }
     }
 
-    /// The scene of a file: a scene file, or a robot alone in still fresh water.
-    pub fn scene(&self, path: &Path) -> Result<Scene> {
+    /// The scene of a file: a scene file, or a robot, with so many faces, alone in still fresh water.
+    pub fn scene(&self, path: &Path, faces: Option<usize>) -> Result<Scene> {
         if is_urdf(path) {
-            return Scene::from_urdf(path, &self.robot());
+            return Scene::from_urdf(path, &self.robot(faces));
         }
         self.refuse(
             path.display().to_string(),
@@ -153,7 +154,7 @@ impl RobotArguments {
 
     /// Refuses choices for a place that isn't a robot's file.
     pub fn refuse(&self, place: String, expected: &str) -> Result<()> {
-        match self.robot() == Robot::default() {
+        match self.robot(None) == Robot::default() {
             true => Ok(()),
             false => Err(Error::input(place, "choices for a robot's file", expected)),
         }
@@ -178,6 +179,9 @@ pub(super) struct Simulation {
     pub water: Water,
     #[command(flatten)]
     robot: RobotArguments,
+    /// Density of the water in kg/m³ [default: the scene's own, around a robot 998].
+    #[arg(long, value_name = "RHO", allow_negative_numbers = true)]
+    density: Option<f64>,
     /// Number of steps [default: the scene's own].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     steps: Option<usize>,
@@ -192,7 +196,8 @@ pub(super) struct Simulation {
 impl Simulation {
     /// The scene, with so many steps if that is asked for, checked.
     pub fn scene(&self) -> Result<Scene> {
-        let mut scene = load(&self.scene, &self.robot)?;
+        let mut scene = load(&self.scene, &self.robot, self.water.faces)?;
+        scene.fluid.density = self.density.unwrap_or(scene.fluid.density);
         scene.steps = self.steps.unwrap_or(scene.steps);
         scene.validate()?;
         Ok(scene)
@@ -243,8 +248,8 @@ impl Water {
 }
 
 /// The scene of a file; one without a name is called as the file.
-pub(super) fn load(path: &Path, robot: &RobotArguments) -> Result<Scene> {
-    let mut scene = robot.scene(path)?;
+pub(super) fn load(path: &Path, robot: &RobotArguments, faces: Option<usize>) -> Result<Scene> {
+    let mut scene = robot.scene(path, faces)?;
     if scene.name.is_empty() {
         let stem = path.file_stem().unwrap_or_default();
         scene.name = stem.to_string_lossy().into_owned();

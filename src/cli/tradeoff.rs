@@ -96,7 +96,7 @@ impl Arguments {
 }
 
 pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
-    let scene = load(&arguments.scene, &arguments.robot)?;
+    let scene = load(&arguments.scene, &arguments.robot, None)?;
     scene.validate()?;
     if let Some(file) = &arguments.plot {
         plot::prepare(file)?;

@@ -15,6 +15,7 @@ pub(super) fn check_names(file: &File, options: &Options) -> Result<()> {
     let moving: Vec<&str> = moving.map(|j| j.name.as_str()).collect();
     let all = [
         ("links", &links, options.links.keys().collect::<Vec<_>>()),
+        ("joints", &moving, options.joints.keys().collect()),
         ("start", &joints, options.start.keys().collect()),
         ("motions", &moving, options.driven.keys().collect()),
         ("zeros", &moving, options.zeroed.keys().collect()),
@@ -34,10 +35,11 @@ pub(super) fn check_names(file: &File, options: &Options) -> Result<()> {
 /// What is chosen must have an effect: starts of joints that have a coordinate of their own, and of bodies what is a body.
 pub(super) fn check_choices(file: &File, groups: &[Group], options: &Options) -> Result<()> {
     for (number, joint) in file.robot.joints.iter().enumerate() {
+        let follows = (joint.mimic.as_ref()).filter(|_| options.followers == Followers::Follow);
+        check_joint(file, number, follows, options)?;
         let Some(start) = options.start.get(&joint.name) else {
             continue;
         };
-        let follows = (joint.mimic.as_ref()).filter(|_| options.followers == Followers::Follow);
         let remedy = match follows {
             _ if joint.joint_type == JointType::Fixed => {
                 "the joint is fixed, and has no coordinate: leave its start out".to_string()
@@ -81,6 +83,39 @@ pub(super) fn check_choices(file: &File, groups: &[Group], options: &Options) ->
         }
     }
     Ok(())
+}
+
+/// What is chosen for a joint is of a coordinate that nothing else gives.
+fn check_joint(
+    file: &File,
+    number: usize,
+    follows: Option<&urdf_rs::Mimic>,
+    options: &Options,
+) -> Result<()> {
+    let joint = &file.robot.joints[number];
+    let choice = options.joints.get(&joint.name);
+    let Some(key) = choice.and_then(|choice| choice.given.first()) else {
+        return Ok(());
+    };
+    let one = matches!(
+        joint.joint_type,
+        JointType::Revolute | JointType::Continuous | JointType::Prismatic
+    );
+    let remedy = match follows {
+        _ if !one => {
+            "only joints with one coordinate (revolute, continuous, prismatic) have it".to_string()
+        }
+        Some(mimic) => format!(
+            "the joint follows {:?}: choose it for that one, or make it `mimic = \"independent\"`",
+            mimic.joint
+        ),
+        None if options.driven.contains_key(&joint.name) => {
+            "the joint is driven, and its force a result: leave it or the motion out".into()
+        }
+        None => return Ok(()),
+    };
+    let place = format!("{}: {key}, as chosen", joint_place(file, number));
+    Err(Error::input(place, "of no effect", remedy))
 }
 
 /// A link's own inertia with the mass that is chosen for it: the inertia grows with it.

@@ -23,6 +23,8 @@ pub(super) struct File {
     pub unused: Vec<Unused>,
     /// What joints have beside what URDF says of them, by name.
     pub extras: HashMap<String, Extra>,
+    /// Joints that are driven, by name, and the stiffness and damping of those that are held at a target; none of a file that doesn't say.
+    pub drives: Option<HashMap<String, Option<[f64; 2]>>>,
     /// Shapes that URDF lacks, by the name that stands in a mesh's place.
     pub shapes: HashMap<String, Shape>,
     /// What is to be told.
@@ -40,6 +42,7 @@ impl File {
             joints: Vec::new(),
             unused: Vec::new(),
             extras: HashMap::new(),
+            drives: None,
             shapes: HashMap::new(),
             notes: Vec::new(),
             coupled_by: "<mimic>",

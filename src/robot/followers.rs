@@ -69,7 +69,7 @@ pub(super) fn follow(
             ));
         };
         followers.push((b, leader, led.ratio, led.offset));
-        give(b, leader, led, all, report);
+        give(file, b, leader, led, all, report);
     }
     for (_, leader, ..) in &followers {
         let (Some(moves), Some(number)) = (&mut all[*leader], joints[*leader]) else {
@@ -122,11 +122,19 @@ fn start_within(
 }
 
 /// Gives the leader what its follower has of limits and losses.
-fn give(b: usize, leader: usize, led: Led, all: &mut [Option<Moves>], report: &mut Report) {
+fn give(
+    file: &File,
+    b: usize,
+    leader: usize,
+    led: Led,
+    all: &mut [Option<Moves>],
+    report: &mut Report,
+) {
     let Some(follower) = all[b].as_mut() else {
         return;
     };
     let (limits, dynamics) = (follower.limits.take(), follower.dynamics);
+    let (actuated, servo) = (follower.actuated, follower.servo.take());
     follower.dynamics = Dynamics::default();
     let (name, ratio, offset) = (follower.name.clone(), led.ratio, led.offset);
     report.note(format!(
@@ -137,6 +145,22 @@ fn give(b: usize, leader: usize, led: Led, all: &mut [Option<Moves>], report: &m
     let Some(of) = all[leader].as_mut() else {
         return;
     };
+    if actuated && file.drives.is_some() {
+        // k (u − r q − o) at the lever r is r² k (u' − q), u' = (u − o)/r.
+        let own = of.actuated;
+        report.note(format!(
+            "joint {name:?}, which follows {:?}, has an actuator{}",
+            of.name,
+            match own {
+                true => ", which isn't read: the leader has its own",
+                false => ": it is the leader's, by the leader's coordinate",
+            }
+        ));
+        if !own {
+            of.actuated = true;
+            of.servo = servo.map(|gains| gains.map(|gain| ratio * ratio * gain));
+        }
+    }
     of.dynamics.damping += ratio * ratio * dynamics.damping;
     of.dynamics.friction += ratio.abs() * dynamics.friction;
     of.dynamics.armature += ratio * ratio * dynamics.armature;

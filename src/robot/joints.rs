@@ -26,6 +26,10 @@ pub(crate) struct Moves {
     pub start: Option<f64>,
     /// Of `<dynamics>`.
     pub dynamics: Dynamics,
+    /// Whether something drives it, as far as the file says.
+    pub actuated: bool,
+    /// Stiffness and damping of what holds it at a target, N/m or N m/rad and N s/m or N m s/rad.
+    pub servo: Option<[f64; 2]>,
     /// The joint that it follows.
     pub mimic: Option<Led>,
 }
@@ -106,6 +110,7 @@ pub(super) fn moves(
         _ => None,
     };
     let limits = limits.filter(|_| !options.without_limits);
+    let limits = chosen_limits(file, number, options)?.or(limits);
     tell_unused(file, number, report);
     let start = start(file, number, axial, limits, options, report)?;
     Ok(Moves {
@@ -114,8 +119,28 @@ pub(super) fn moves(
         limits,
         start,
         dynamics,
+        actuated: (file.drives.as_ref()).is_none_or(|drives| drives.contains_key(&given.name)),
+        servo: (file.drives.as_ref()).and_then(|drives| *drives.get(&given.name)?),
         mimic: None,
     })
+}
+
+/// Limits that stand for the file's.
+fn chosen_limits(file: &File, number: usize, options: &Options) -> Result<Option<[f64; 2]>> {
+    let choice = options.joints.get(&file.robot.joints[number].name);
+    let Some([lower, upper]) = choice.and_then(|choice| choice.limits) else {
+        return Ok(None);
+    };
+    if lower < upper && lower.is_finite() && upper.is_finite() {
+        return Ok(Some([lower, upper]));
+    }
+    let place = format!("{}: limits, as chosen", joint_place(file, number));
+    let given = format!("{lower} to {upper}");
+    Err(Error::input(
+        place,
+        given,
+        "give two finite numbers, the larger one second",
+    ))
 }
 
 /// Tells what a joint of its kind has no use for.

@@ -28,5 +28,5 @@ mod tree;
 pub(crate) use bodies::{Imported, RobotBody, import};
 pub(crate) use joints::{Dynamics, Led};
 pub use options::{BadMeshes, Base, Followers, Wet};
-pub(crate) use options::{LinkChoice, Options};
+pub(crate) use options::{JointChoice, LinkChoice, Options};
 pub use report::{BodyReport, FoldedReport, MeshUse, Report, Unused};

@@ -72,6 +72,15 @@ impl LinkChoice {
     }
 }
 
+/// What is chosen for a joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct JointChoice {
+    /// m or rad.
+    pub limits: Option<[f64; 2]>,
+    /// All that is chosen, by the keys' names.
+    pub given: Vec<&'static str>,
+}
+
 /// What is chosen for a robot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Options {
@@ -87,5 +96,6 @@ pub(crate) struct Options {
     pub driven: BTreeMap<String, Vec<f64>>,
     /// Joints that get an offset, and that.
     pub zeroed: BTreeMap<String, f64>,
+    pub joints: BTreeMap<String, JointChoice>,
     pub links: BTreeMap<String, LinkChoice>,
 }

@@ -44,8 +44,8 @@ pub use origin::Origin;
 pub use passive::Passive;
 #[cfg(feature = "urdf")]
 pub use robot::{
-    Added, BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Robot, RobotLink,
-    RobotReport, Unused, Wet,
+    Added, BadMeshes, Base, BodyReport, FoldedReport, Followers, MeshUse, Robot, RobotJoint,
+    RobotLink, RobotReport, Unused, Wet,
 };
 pub use servo::Servo;
 pub use site::Site;

@@ -875,6 +875,31 @@ fn robots_of_scenes_are_told() {
         1,
         &["--density", "fluid"],
     );
+    fails(
+        &["inspect", &two, "--faces", "80"],
+        1,
+        &["--faces", "[[robot]]"],
+    );
+    fails(
+        &["run", &robot, "--density=-1"],
+        1,
+        &["fluid.density", "-1"],
+    );
+    // In no water there is nothing that flows, and nothing floats.
+    let moved = |density: &str| {
+        let ran = json(&[
+            "run",
+            &robot,
+            "--steps",
+            "1",
+            "--fidelity",
+            "isolated",
+            "--density",
+            density,
+        ]);
+        ran["energy_final"].as_f64().unwrap()
+    };
+    assert_ne!(moved("998"), moved("0"));
     for input in [&two, &robot] {
         let ran = said(&["run", input, "--steps", "1", "--fidelity", "isolated"]);
         crate::support::says(&ran, &["warning: robot \"r\"", "body \"c\" is dry"]);

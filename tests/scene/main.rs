@@ -1,6 +1,8 @@
 //! Scenes: files, what is refused and how that is said, and the example scenes.
 
 mod api_input;
+#[cfg(feature = "urdf")]
+mod drives;
 mod examples;
 mod input;
 #[cfg(feature = "urdf")]

@@ -101,7 +101,7 @@ fn bodies_are_where_the_file_has_them() {
     says(
         &report,
         &[
-            "<motor> of <actuator>",
+            "[\"pitch\", \"out\"] have no actuator",
             "its frame is at its joint",
             "<geom> of the world",
         ],

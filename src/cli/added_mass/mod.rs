@@ -53,8 +53,13 @@ struct Source {
 }
 
 impl Source {
-    /// What is asked about, as a scene; `density` replaces the water's.
-    fn scene(&self, density: Option<f64>, robot: &RobotArguments) -> Result<Scene> {
+    /// What is asked about, as a scene; `density` replaces the water's, and `faces` are those of a robot.
+    fn scene(
+        &self,
+        density: Option<f64>,
+        robot: &RobotArguments,
+        faces: Option<usize>,
+    ) -> Result<Scene> {
         let alone = |shape: Shape, name: &str, place: String| {
             let only = "only robots (.urdf, .mjcf, .xml) have them: leave them out";
             robot.refuse(place, only)?;
@@ -75,7 +80,7 @@ impl Source {
                 "obj" | "stl" | "ply" | "dae" => {
                     alone(Shape::mesh(path), &stem, path.display().to_string())?
                 }
-                scene if scene == "toml" || is_urdf(path) => robot.scene(path)?,
+                scene if scene == "toml" || is_urdf(path) => robot.scene(path, faces)?,
                 _ => {
                     return Err(Error::input(
                         path.display().to_string(),
@@ -134,9 +139,10 @@ pub(super) fn main(arguments: &Arguments, output: Output) -> Result<Exit> {
         ));
         return Ok(Exit::Usage);
     }
-    let scene = arguments
-        .source
-        .scene(arguments.density, &arguments.robot)?;
+    let scene =
+        arguments
+            .source
+            .scene(arguments.density, &arguments.robot, arguments.water.faces)?;
     if let Some(format) = arguments.format {
         return written(&scene, arguments, format);
     }

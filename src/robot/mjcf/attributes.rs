@@ -38,7 +38,22 @@ const GEOMS: &[&str] = &[
     "sdf",
 ];
 
-/// What an attribute that is read is, by the element; a joint of `<equality>` is `coupling`. None if it isn't read.
+/// Elements of `<actuator>` that are read.
+pub(super) const DRIVES: [&str; 4] = ["motor", "position", "velocity", "general"];
+/// What attributes of an element of `<actuator>` are of.
+pub(super) const DRIVE: &str = "actuator";
+/// An element of `<actuator>` that isn't read, but for the joint that it drives.
+pub(super) const OTHER_DRIVE: &str = "another actuator";
+
+/// What an element of `<actuator>`, or of a class, is to [`read`].
+pub(super) fn kind(tag: &str) -> &str {
+    match DRIVES.contains(&tag) {
+        true => DRIVE,
+        false => tag,
+    }
+}
+
+/// What an attribute that is read is, by the element; a joint of `<equality>` is `coupling`, an element of `<actuator>` `actuator`. None if it isn't read.
 pub(super) fn read(element: &str, name: &str) -> Option<Kind> {
     let placed = matches!(element, "body" | "frame" | "inertial" | "geom" | "site");
     Some(match (element, name) {
@@ -76,6 +91,11 @@ pub(super) fn read(element: &str, name: &str) -> Option<Kind> {
         ("coupling", "name" | "class" | "joint1" | "joint2") => Kind::Text,
         ("coupling", "polycoef") => Kind::Numbers(1, 5),
         ("coupling" | "equality", "active") => FLAG,
+        (DRIVE, "name" | "class" | "joint" | "jointinparent" | "tendon") => Kind::Text,
+        (DRIVE, "kp" | "kv") => NUMBER,
+        (DRIVE, "gear") => Kind::Numbers(1, 6),
+        (DRIVE, "gaintype" | "biastype" | "dyntype") => Kind::Text,
+        (DRIVE, "gainprm" | "biasprm") => Kind::Numbers(1, 10),
         (_, "pos" | "zaxis" | "euler") if placed => VECTOR,
         (_, "quat" | "axisangle") if placed => Kind::Numbers(4, 4),
         (_, "xyaxes") if placed => Kind::Numbers(6, 6),
@@ -147,6 +167,32 @@ fn known(element: &str, name: &str) -> bool {
         ],
         "site" => &["group", "material", "rgba", "size", "type", "user"],
         "coupling" | "equality" => &["solimp", "solref"],
+        DRIVE => &[
+            "actdim",
+            "actearly",
+            "actlimited",
+            "actrange",
+            "body",
+            "cranklength",
+            "cranksite",
+            "ctrllimited",
+            "ctrlrange",
+            "dampratio",
+            "delay",
+            "dynprm",
+            "forcelimited",
+            "forcerange",
+            "group",
+            "inheritrange",
+            "interp",
+            "lengthrange",
+            "nsample",
+            "refsite",
+            "site",
+            "slidersite",
+            "timeconst",
+            "user",
+        ],
         _ => &[],
     };
     all.contains(&name)

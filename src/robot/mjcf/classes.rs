@@ -4,7 +4,9 @@ use super::element::Element;
 use crate::Result;
 
 /// The elements that have defaults.
-pub(super) const KINDS: [&str; 5] = ["geom", "joint", "site", "mesh", "equality"];
+pub(super) const KINDS: [&str; 9] = [
+    "geom", "joint", "site", "mesh", "equality", "motor", "position", "velocity", "general",
+];
 /// What may have fewer numbers than there are: the others stay those of the class.
 const PADDED: &str = "size";
 /// The class that the others hang on.

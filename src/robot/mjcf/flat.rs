@@ -1,6 +1,6 @@
 //! The file as one that leaves nothing to be looked up: no includes, no classes, and of elements and attributes those that are read.
 
-use super::attributes::{numbers, read};
+use super::attributes::{DRIVE, DRIVES, OTHER_DRIVE, numbers, read};
 use super::classes::Classes;
 use super::element::{Element, TURNS};
 use super::geometry::{between, z_along};
@@ -8,7 +8,7 @@ use crate::Result;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Sections, in the order in which they are to be read.
-const SECTIONS: [&str; 4] = ["compiler", "asset", "worldbody", "equality"];
+const SECTIONS: [&str; 5] = ["compiler", "asset", "worldbody", "equality", "actuator"];
 /// Shapes that may lie between two points.
 const LONG: [&str; 4] = ["capsule", "cylinder", "box", "ellipsoid"];
 
@@ -19,8 +19,13 @@ const LONG: [&str; 4] = ["capsule", "cylinder", "box", "ellipsoid"];
 pub(super) fn flat(file: &Element) -> Result<Element> {
     let classes = Classes::of(file)?;
     let mut made = own(file, "mujoco");
-    let [mut compiler, mut asset, mut world, mut equality] =
-        SECTIONS.map(|tag| Element::at(tag, file));
+    let [
+        mut compiler,
+        mut asset,
+        mut world,
+        mut equality,
+        mut actuator,
+    ] = SECTIONS.map(|tag| Element::at(tag, file));
     for section in file.all("compiler") {
         for (name, value) in &own(section, "compiler").attributes {
             compiler.set(name, value);
@@ -48,13 +53,33 @@ pub(super) fn flat(file: &Element) -> Result<Element> {
             }
         }
     }
-    coupled(&equality, &world)?;
-    made.children = vec![compiler, asset, world, equality];
+    for section in file.all("actuator") {
+        for one in &section.children {
+            let kind = match DRIVES.contains(&&one.tag[..]) {
+                true => &one.tag[..],
+                false => OTHER_DRIVE,
+            };
+            let mut one = own(&classes.resolved(one, kind, None)?, DRIVE);
+            // Of a joint with one coordinate both are the same.
+            if let Some(joint) = one.get("jointinparent").map(String::from) {
+                one.set("joint", &joint);
+            }
+            actuator.children.push(one);
+        }
+    }
+    let joints = joints(&world);
+    for coupling in equality.all("joint") {
+        has_one_coordinate(coupling, &joints)?;
+    }
+    for drive in &actuator.children {
+        has_joint(drive, "joint", &joints, "the actuators")?;
+    }
+    made.children = vec![compiler, asset, world, equality, actuator];
     Ok(made)
 }
 
-/// Refuses equalities of joints that aren't there, or have more than one coordinate.
-fn coupled(equality: &Element, world: &Element) -> Result<()> {
+/// All joints of bodies.
+fn joints(world: &Element) -> Vec<&Element> {
     let mut joints = Vec::new();
     let mut open = vec![world];
     while let Some(element) = open.pop() {
@@ -62,25 +87,49 @@ fn coupled(equality: &Element, world: &Element) -> Result<()> {
         joints.extend(own.clone().filter(|e| e.tag.ends_with("joint")));
         open.extend(own);
     }
-    for coupling in equality.all("joint") {
-        for end in ["joint1", "joint2"] {
-            let Some(name) = coupling.get(end).filter(|name| !name.is_empty()) else {
-                continue;
-            };
-            let Some(joint) = joints.iter().find(|j| j.get("name") == Some(name)) else {
-                let what = format!("{end} = {name:?}: there is no such joint");
-                return Err(coupling.wrong_of("the equalities", what));
-            };
-            let kind = match &joint.tag[..] {
-                "freejoint" => "free",
-                _ => joint.get("type").unwrap_or("hinge"),
-            };
-            if !["hinge", "slide"].contains(&kind) {
-                let what = format!(
-                    "{end} = {name:?} is a {kind} joint: only hinges and slides have the one coordinate that an <equality> couples"
-                );
-                return Err(coupling.wrong_of("the equalities", what));
-            }
+    joints
+}
+
+/// The joint that an attribute names, if it is there.
+///
+/// # Errors
+/// A joint that isn't there; `of` is where the attribute is.
+fn has_joint<'e>(
+    element: &Element,
+    attribute: &str,
+    joints: &[&'e Element],
+    of: &str,
+) -> Result<Option<&'e Element>> {
+    let Some(name) = element.get(attribute).filter(|name| !name.is_empty()) else {
+        return Ok(None);
+    };
+    let found = joints.iter().find(|j| j.get("name") == Some(name));
+    match found {
+        Some(found) => Ok(Some(found)),
+        None => {
+            let what = format!("{attribute} = {name:?}: there is no such joint");
+            Err(element.wrong_of(of, what))
+        }
+    }
+}
+
+/// Refuses equalities of joints that aren't there, or have more than one coordinate.
+fn has_one_coordinate(coupling: &Element, joints: &[&Element]) -> Result<()> {
+    let of = "the equalities";
+    for end in ["joint1", "joint2"] {
+        let Some(joint) = has_joint(coupling, end, joints, of)? else {
+            continue;
+        };
+        let kind = match &joint.tag[..] {
+            "freejoint" => "free",
+            _ => joint.get("type").unwrap_or("hinge"),
+        };
+        if !["hinge", "slide"].contains(&kind) {
+            let name = coupling.get(end).unwrap_or_default();
+            let what = format!(
+                "{end} = {name:?} is a {kind} joint: only hinges and slides have the one coordinate that an <equality> couples"
+            );
+            return Err(coupling.wrong_of(of, what));
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! What of an MJCF file isn't read: said where it changes little, refused where bodies or joints would be missing. And what can't be.
 
 use super::super::report::Unused;
-use super::attributes::{check, read, unread};
+use super::attributes::{self, DRIVE, DRIVES, check, read, unread};
 use super::classes::KINDS;
 use super::element::{Element, TURNS};
 use crate::Result;
@@ -56,6 +56,7 @@ impl<'p> LeftOut<'p> {
                 "asset" => self.assets(section)?,
                 "worldbody" => self.body(section, "the world")?,
                 "equality" => self.equalities(section)?,
+                "actuator" => self.actuators(section)?,
                 "option" | "size" | "statistic" | "visual" => {
                     self.note(format!("<{}>", section.tag), section);
                 }
@@ -111,7 +112,7 @@ impl<'p> LeftOut<'p> {
             match &inner.tag[..] {
                 "default" => self.class(inner, name)?,
                 kind if KINDS.contains(&kind) => {
-                    self.leaf(inner, kind, &of)?;
+                    self.leaf(inner, attributes::kind(kind), &of)?;
                     if inner.get("name").is_some() {
                         self.note(format!("name of <{kind}> of <default>"), inner);
                     }
@@ -151,6 +152,16 @@ impl<'p> LeftOut<'p> {
                 // Of these it is told what they are.
                 tag if EQUALITIES.contains(&tag) => {}
                 tag => self.note(format!("<{tag}> of <equality>"), equality),
+            }
+        }
+        Ok(())
+    }
+
+    fn actuators(&mut self, section: &Element) -> Result<()> {
+        for actuator in &section.children {
+            match DRIVES.contains(&&actuator.tag[..]) {
+                true => self.leaf(actuator, DRIVE, "the actuators")?,
+                false => self.note(format!("<{}> of <actuator>", actuator.tag), actuator),
             }
         }
         Ok(())

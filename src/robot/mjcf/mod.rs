@@ -4,6 +4,7 @@
 //! its joint's, that of a body whose joint isn't at its origin is at the joint. Files that are included ([`includes`]) and classes of defaults ([`classes`]) are resolved in the text, which is checked there ([`left_out`]); `mjcf-rs` reads what
 //! comes of it ([`flat`]), with its angles and frames. Numbers are known to be finite then.
 
+mod actuators;
 mod attributes;
 mod classes;
 mod element;
@@ -60,6 +61,7 @@ pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
         made.body(id)?;
     }
     made.equalities();
+    made.actuators();
     made.total_mass();
     made.check_masses()?;
     made.file.unused.extend(left_out.unused());

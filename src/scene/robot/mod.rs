@@ -1,8 +1,11 @@
 //! Robots of a scene: what is written of them, and the bodies and sites that they become.
 
+mod joint;
+mod link;
+
 use super::{
-    Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Motion, Passive, Placement, Scene, Site,
-    is_default,
+    Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Motion, Passive, Placement, Scene, Servo,
+    Site, is_default,
 };
 use crate::multibody::Joint;
 pub use crate::robot::{
@@ -11,77 +14,12 @@ pub use crate::robot::{
 };
 use crate::robot::{Imported, Led, LinkChoice, Options, RobotBody, import};
 use crate::{Error, Result};
+pub use joint::RobotJoint;
+pub use link::RobotLink;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// What is chosen for a link of a robot.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RobotLink {
-    /// What the water sees of it; default: the robot's `shape`.
-    #[serde(skip_serializing_if = "is_default")]
-    pub shape: Option<Wet>,
-    /// Mass instead of the file's, kg; the inertia grows with it.
-    #[serde(skip_serializing_if = "is_default")]
-    pub mass: Option<f64>,
-    /// Density of the body that the link's frame and name are of, kg/m³: mass, centre and inertia are those of its surface filled evenly.
-    #[serde(skip_serializing_if = "is_default")]
-    pub density: Option<f64>,
-    /// Whether it stays a body of its own at a fixed joint, instead of folding into what carries it.
-    #[serde(skip_serializing_if = "is_default")]
-    pub keep: bool,
-    /// Centre of mass of the body that the link's frame and name are of, instead of the file's, m. This and what follows are as those of [`Body`].
-    #[serde(skip_serializing_if = "is_default")]
-    pub center_of_mass: Option<[f64; 3]>,
-    /// Its inertia about the centre of mass, kg m²: xx, yy, zz or xx, yy, zz, xy, xz, yz.
-    #[serde(skip_serializing_if = "is_default")]
-    pub inertia: Option<Vec<f64>>,
-    /// Volume by which it is buoyant, m³.
-    #[serde(skip_serializing_if = "is_default")]
-    pub volume: Option<f64>,
-    /// Where buoyancy acts, m.
-    #[serde(skip_serializing_if = "is_default")]
-    pub center_of_buoyancy: Option<[f64; 3]>,
-    /// Its own added mass at unit density about the link's origin, 6 × 6.
-    #[serde(skip_serializing_if = "is_default")]
-    pub added_mass: Option<Vec<Vec<f64>>>,
-    /// Whether it may lie in what carries it, also where it doesn't at the start: the two don't feel each other through the water.
-    #[serde(skip_serializing_if = "is_default")]
-    pub overlaps_parent: bool,
-}
-
-impl RobotLink {
-    /// What is chosen of the body that the link's frame and name are of, by the keys' names.
-    fn of_body(&self) -> Vec<&'static str> {
-        let keys = [
-            ("density", self.density.is_some()),
-            ("center_of_mass", self.center_of_mass.is_some()),
-            ("inertia", self.inertia.is_some()),
-            ("volume", self.volume.is_some()),
-            ("center_of_buoyancy", self.center_of_buoyancy.is_some()),
-            ("added_mass", self.added_mass.is_some()),
-            ("overlaps_parent", self.overlaps_parent),
-        ];
-        let given = keys.into_iter().filter(|(_, given)| *given);
-        given.map(|(key, _)| key).collect()
-    }
-
-    /// Puts what is chosen in place of what the file says.
-    fn apply(&self, body: &mut Body) {
-        body.center_of_mass = self.center_of_mass.or(body.center_of_mass);
-        body.volume = self.volume.or(body.volume);
-        body.overlaps_parent |= self.overlaps_parent;
-        body.center_of_buoyancy = self.center_of_buoyancy.or(body.center_of_buoyancy);
-        if self.inertia.is_some() {
-            body.inertia.clone_from(&self.inertia);
-        }
-        if self.added_mass.is_some() {
-            body.added_mass.clone_from(&self.added_mass);
-        }
-    }
-}
 
 /// A robot in a URDF or MJCF file: `[[robot]]` of a scene file, which reading it turns into bodies and sites.
 ///
@@ -117,8 +55,11 @@ pub struct Robot {
     /// What is done about joints that follow others.
     #[serde(skip_serializing_if = "is_default")]
     pub mimic: Followers,
-    /// Whether its joints are controls: all that have one coordinate. Default: they are.
+    /// Whether its joints are controls: all that have one coordinate. Default: they are, in a file that has actuators those that have one.
     pub actuated: Option<bool>,
+    /// Drive of all its joints that are controls, which are then their targets; default: as the file has it.
+    #[serde(skip_serializing_if = "is_default")]
+    pub servo: Option<Servo>,
     /// Whether joints stop at their limits. Default: they do.
     pub limits: Option<bool>,
     /// Drag on the surfaces of all its wet bodies.
@@ -133,6 +74,9 @@ pub struct Robot {
     /// Motions that drive joints, one per coordinate, by the joints' names; they are then no controls.
     #[serde(skip_serializing_if = "is_default")]
     pub motions: BTreeMap<String, Vec<Motion>>,
+    /// What is chosen for single joints, by their names in the file.
+    #[serde(skip_serializing_if = "is_default")]
+    pub joints: BTreeMap<String, RobotJoint>,
     /// What is chosen for single links, by their names in the file.
     #[serde(skip_serializing_if = "is_default")]
     pub links: BTreeMap<String, RobotLink>,
@@ -166,12 +110,20 @@ setters! { Robot {
     mimic(mimic: Followers) => mimic = mimic;
     /// Drag on the surfaces of all its wet bodies.
     drag(drag: Drag) => drag = Some(drag);
+    /// Drive of all its joints that are controls.
+    servo(servo: Servo) => servo = Some(servo);
 } }
 
 impl Robot {
     /// With other choices for a link, by its name in the file.
     pub fn link(mut self, name: impl Into<String>, link: RobotLink) -> Self {
         self.links.insert(name.into(), link);
+        self
+    }
+
+    /// With other choices for a joint, by its name in the file.
+    pub fn joint(mut self, name: impl Into<String>, joint: RobotJoint) -> Self {
+        self.joints.insert(name.into(), joint);
         self
     }
 
@@ -205,6 +157,9 @@ impl Robot {
                 .map(|(joint, motion)| (joint.clone(), begins(motion)))
                 .collect(),
             zeroed: self.zeros.clone(),
+            joints: (self.joints.iter())
+                .map(|(name, of)| (name.clone(), of.choice()))
+                .collect(),
             links: (self.links.iter())
                 .map(|(name, of)| (name.clone(), link(of)))
                 .collect(),
@@ -432,13 +387,15 @@ impl Robot {
                 made.joint = moves.joint;
                 made.limits = moves.limits;
                 made.start = moves.start.into_iter().collect();
-                let one = moves.joint.coordinates() == 1;
-                made.actuated = one && self.actuated != Some(false);
-                if one {
-                    made.passive = passive(&moves.dynamics);
-                }
                 if moves.mimic.is_some() {
-                    (made.actuated, made.start) = (false, Vec::new());
+                    made.start.clear();
+                } else if moves.joint.coordinates() == 1 {
+                    made.actuated = self.actuated.unwrap_or(moves.actuated);
+                    let drive = |[k, c]: [f64; 2]| Servo::new(k, c);
+                    let servo = self.servo.or(moves.servo.map(drive));
+                    made.passive = passive(&moves.dynamics);
+                    let choice = self.joints.get(&moves.name).cloned();
+                    choice.unwrap_or_default().apply(&mut made, servo);
                 }
             }
             None => {
@@ -464,7 +421,8 @@ impl Robot {
         let motion = (body.moves.as_ref()).and_then(|moves| self.motions.get(&moves.name));
         if let Some(motion) = motion {
             made.motion = Some(motion.clone());
-            (made.actuated, made.passive, made.limits) = (false, None, None);
+            (made.actuated, made.servo) = (false, None);
+            (made.passive, made.limits) = (None, None);
             made.start.clear();
         }
         made.overlaps_parent = body.overlaps_parent;

@@ -4,6 +4,7 @@ mod drops;
 mod flush;
 mod geometry;
 mod heaps;
+mod held;
 mod integrators;
 mod joints;
 mod parts;

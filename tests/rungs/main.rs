@@ -243,6 +243,10 @@ const THROUGH: &[(&str, &str)] = &[
         "dynamics::integrator::reaction::Reaction::force_vjp",
     ),
     (
+        "dynamics::integrator::hold::Hold::impulse_vjp",
+        "dynamics::integrator::end_contact::Adjoint::apply_vjp",
+    ),
+    (
         "dynamics::integrator::motion_push::MotionPush::push_vjp",
         "dynamics::integrator::end_contact::Adjoint::apply_vjp",
     ),
@@ -363,6 +367,10 @@ const THROUGH: &[(&str, &str)] = &[
     (
         "dynamics::resistance::Evaluation::resistance_jvp",
         "dynamics::integrator::reaction::Reaction::force_jvp",
+    ),
+    (
+        "dynamics::integrator::hold::Hold::impulse_jvp",
+        "dynamics::integrator::end_contact::Adjoint::apply_jvp",
     ),
     (
         "dynamics::integrator::motion_push::MotionPush::push_jvp",

@@ -4,8 +4,11 @@
 //! ```text
 //! M (v_e − v*) = P + Δt g(q, v_e)      p̂⁺ = p̂ + Δt f(q, v*) + X⁻ᵀ (P + Δt g(q, v_e))
 //! ```
+//!
+//! Where v* has with it what contact bears already, λ ([`super::hold`]), v* is about v_s, and there is one problem, M (v_s − v*) = Δt g(q, v_s) − λ.
 
 use super::contact::{Problem, pressed, solve, solve_pushed};
+use super::hold::Hold;
 use super::motion_push::{MotionPush, Push};
 use super::reaction::Resisting;
 use super::stages::ContactVelocities;
@@ -14,13 +17,22 @@ use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
 use nalgebra::{DMatrix, DVector};
 
-/// The end of a step from the velocity and the frame momenta before contact.
+/// The end of a step from the velocity and the frame momenta before contact, which have with them what it bears already.
 pub(super) fn apply(
     start: &Start,
     before: DVector<f64>,
     mut hat: DVector<f64>,
+    hold: Option<Hold>,
 ) -> Result<(State, ContactVelocities)> {
     let dt = start.stepper.dt;
+    if let Some(hold) = hold {
+        let Push { user, frame } = hold.impulse(start);
+        let after = solve_pushed(start, &before, &-user, dt, &before, Resisting::AtStart)?;
+        let mut velocities = ContactVelocities::new(before, after);
+        velocities.held = Some(hold.velocity());
+        let next = ends(start, &velocities, hat - frame);
+        return Ok((next, velocities));
+    }
     let after = solve(start, &before, dt, Resisting::AtStart)?;
     let mut velocities = ContactVelocities::new(before, after);
     if let Some(motion) = MotionPush::new(start, &velocities, Resisting::No)? {
@@ -62,8 +74,16 @@ impl<'s, 'a> Adjoint<'s, 'a> {
     /// At a step's velocities before and after contact.
     pub fn new(start: &Start<'_, 'a>, velocities: &'s ContactVelocities) -> Result<Self> {
         let dt = start.stepper.dt;
-        let ContactVelocities { before, after, .. } = velocities;
-        let motion = MotionPush::new(start, velocities, Resisting::No)?;
+        let ContactVelocities {
+            before,
+            after,
+            held,
+            ..
+        } = velocities;
+        let motion = match held {
+            None => MotionPush::new(start, velocities, Resisting::No)?,
+            Some(_) => None,
+        };
         let end = motion.map(|motion| {
             Ok(End {
                 problem: Problem::pushed(
@@ -78,12 +98,15 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         });
         Ok(Self {
             velocities,
-            moved: Problem::new(start, before, after, dt, Resisting::AtStart)?,
+            moved: match held {
+                None => Problem::new(start, before, after, dt, Resisting::AtStart)?,
+                Some(_) => Problem::pushed(start, before, after, dt, Resisting::AtStart)?,
+            },
             end: end.transpose()?,
         })
     }
 
-    /// The state at the end of the step, from the frame momenta before contact.
+    /// The state at the end of the step, from the frame momenta before contact, of a step in which it bears nothing already.
     pub fn reached(&self, start: &Start, mut hat: DVector<f64>) -> State {
         if let Some(End { motion, .. }) = &self.end {
             hat += motion.push(start).frame;
@@ -91,16 +114,25 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         ends(start, self.velocities, hat)
     }
 
-    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact: of the state, and of the velocity with which contact acts.
+    /// Tangents of [`apply`], from those of the velocity and of the momenta before contact, and of what it bears already: of the state, and of the velocity with which contact acts.
     pub fn apply_jvp(
         &self,
         start: &Start<'_, 'a>,
         along: &StepTangents,
         before: &DMatrix<f64>,
         mut hat: DMatrix<f64>,
+        borne: Option<&Push<DMatrix<f64>>>,
     ) -> Result<(StateTangents, DMatrix<f64>)> {
         let velocities = self.velocities;
-        let after = self.moved.solve_jvp(start, along, before)?;
+        let after = match borne {
+            None => self.moved.solve_jvp(start, along, before)?,
+            Some(Push { user, .. }) => {
+                (self.moved).solve_pushed_jvp(start, along, before, &-user)?
+            }
+        };
+        if let Some(Push { frame, .. }) = borne {
+            hat -= frame;
+        }
         let q = start.advance_jvp(&velocities.after, along.q, &after);
         let (problem, acting) = match &self.end {
             None => (&self.moved, after),
@@ -119,14 +151,15 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         Ok((next, acting))
     }
 
-    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, with that of the velocity with which contact acts from elsewhere; the rest is added to `bar`.
+    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, and of what it bears already, with that of the velocity with which contact acts from
+    /// elsewhere; the rest is added to `bar`.
     pub fn apply_vjp(
         &self,
         start: &Start<'_, 'a>,
         next_bar: &StateBar,
         own: Option<&DVector<f64>>,
         bar: &mut StepBar,
-    ) -> Result<(DVector<f64>, DVector<f64>)> {
+    ) -> Result<([DVector<f64>; 2], Push<DVector<f64>>)> {
         let (q_bar, mut after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
         bar.state.q += q_bar;
         let hat_bar = start.next_momentum_bar(next_bar);
@@ -146,7 +179,12 @@ impl<'s, 'a> Adjoint<'s, 'a> {
                 before_bar += held + own.before;
             }
         }
-        before_bar += self.moved.solve_vjp(start, &after_bar, bar)?;
-        Ok((before_bar, hat_bar))
+        let (held, user) = self.moved.solve_pushed_vjp(start, &after_bar, bar)?;
+        before_bar += held;
+        let borne_bar = Push {
+            user: -user,
+            frame: -&hat_bar,
+        };
+        Ok(([before_bar, hat_bar], borne_bar))
     }
 }

@@ -13,6 +13,7 @@
 
 use super::end_contact;
 use super::energy::{self, Closure};
+use super::hold::Hold;
 use super::plan::Halt;
 use super::quasi::{self, Trial};
 use super::rule::Rule;
@@ -228,11 +229,15 @@ pub(super) fn solve_stage<'a>(
             "bodies are up to {farthest:.1e} m from the world's origin, and momenta about it lose their digits: put the origin near the bodies, or take an explicit integrator"
         ),
         false => format!(
-            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad in it){}",
+            "the time step is too long for these velocities or forces: take a smaller one (bodies turn by up to {:.2} rad in it){}{}",
             turning * rule.reach.max(2.0 * (rule.h - rule.reach)),
             match rule.reach > 0.0 && tree.links().iter().any(|link| link.parent.is_some()) {
                 true =>
                     ", or the integrator `midpoint`, which bears light bodies that carry heavy ones",
+                false => "",
+            },
+            match start.near.may_touch() {
+                true => ", or where surfaces are pressed together a larger `contact.stiffness`",
                 false => "",
             }
         ),
@@ -255,41 +260,66 @@ fn rule(s: &Stepper) -> Rule {
 }
 
 pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
-    let (v, hat) = free(start)?;
-    let (next, velocities) = end_contact::apply(start, v, hat)?;
+    let (next, velocities) = free(start)?.ends(start)?;
     Ok((next, Stages::Contact(velocities)))
 }
 
-/// The velocity and the frame momenta with which a step ends without contact.
-fn free(start: &Start) -> std::result::Result<(DVector<f64>, DVector<f64>), Halt> {
+/// What a step comes to before contact is solved.
+struct Free {
+    v: DVector<f64>,
+    /// Frame momenta, with what contact bears already.
+    hat: DVector<f64>,
+    hold: Option<Hold>,
+}
+
+fn free(start: &Start) -> std::result::Result<Free, Halt> {
     let (s, e) = (start.stepper, start.e);
-    let p = start.momentum();
+    let hold = Hold::new(start)?;
+    let p = momentum(start, hold.as_ref());
     let stage = solve_stage(start, e, &p, rule(s), start.v)?;
-    Ok((stage.v, p + s.dt * stage.force))
+    Ok(Free {
+        v: stage.v,
+        hat: p + s.dt * stage.force,
+        hold,
+    })
+}
+
+/// The momenta from which the stage is solved.
+fn momentum(start: &Start, hold: Option<&Hold>) -> DVector<f64> {
+    let p = start.momentum();
+    match hold {
+        None => p,
+        Some(hold) => p + hold.impulse(start).frame,
+    }
+}
+
+impl Free {
+    fn presses(&self, start: &Start) -> bool {
+        self.hold.is_some() || start.near.touches(&self.v)
+    }
+
+    fn ends(self, start: &Start) -> Result<(State, ContactVelocities)> {
+        end_contact::apply(start, self.v, self.hat, self.hold)
+    }
+
+    fn touching(self, start: &Start) -> std::result::Result<(State, Stages), Halt> {
+        let (next, velocities) = self.ends(start)?;
+        Ok((next, Stages::Touching(velocities)))
+    }
 }
 
 /// The step of an integrator that leaves those in which surfaces press to this one.
 pub(super) fn touching_step(start: &Start) -> std::result::Result<(State, Stages), Halt> {
-    let (v, hat) = free(start)?;
-    touching(start, v, hat)
+    free(start)?.touching(start)
 }
 
 /// The same, if surfaces press in it.
 pub(super) fn touching_step_if_any(
     start: &Start,
 ) -> std::result::Result<Option<(State, Stages)>, Halt> {
-    let (v, hat) = free(start)?;
-    let presses = start.near.touches(&v);
-    presses.then(|| touching(start, v, hat)).transpose()
-}
-
-fn touching(
-    start: &Start,
-    v: DVector<f64>,
-    hat: DVector<f64>,
-) -> std::result::Result<(State, Stages), Halt> {
-    let (next, velocities) = end_contact::apply(start, v, hat)?;
-    Ok((next, Stages::Touching(velocities)))
+    let free = free(start)?;
+    let presses = free.presses(start);
+    presses.then(|| free.touching(start)).transpose()
 }
 
 /// The same, whose energy is closed.
@@ -307,6 +337,7 @@ pub(super) struct Adjoint<'s, 'a> {
     /// p̂ + Δt f.
     reached: DVector<f64>,
     stage: AdjointStage<'a>,
+    hold: Option<Hold>,
     closure: Option<Closure<'a>>,
 }
 
@@ -315,7 +346,9 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         let (s, e) = (start.stepper, start.e);
         let control = &start.input.control;
         let force = e.force(&velocities.before, control)?;
-        let reached = start.momentum() + s.dt * force;
+        let held = velocities.held.as_ref();
+        let hold = held.map(|held| Hold::made(start, held));
+        let reached = momentum(start, hold.as_ref()) + s.dt * force;
         let contact = end_contact::Adjoint::new(start, velocities)?;
         let closure = match s.integrator {
             Integrator::EnergyEuler => {
@@ -329,6 +362,7 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             stage: AdjointStage::new(start, e, &velocities.before, &reached, rule(s))?,
             contact,
             reached,
+            hold,
         })
     }
 }
@@ -348,11 +382,19 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let tree = &e.system.tree;
         let [by_q, _, by_hat] = tree.chart_momentum_slopes(&e.q, &(s.dt * before), &self.reached);
         // p̂ + Δt f at a given velocity; the stage's matrix holds what the velocity does.
-        let held = start.momentum_jvp(along)? + s.dt * force.along(q, None, inputs);
+        let borne = self
+            .hold
+            .as_ref()
+            .map(|hold| hold.impulse_jvp(start, along));
+        let borne = borne.transpose()?;
+        let mut held = start.momentum_jvp(along)? + s.dt * force.along(q, None, inputs);
+        if let Some(borne) = &borne {
+            held += &borne.frame;
+        }
         let right = by_q.dense() * q + by_hat.dense() * &held - momentum.along(q, None, inputs);
         let v = self.stage.solve_jvp(e, split, &right)?;
         let hat = held + s.dt * (force.v * &v);
-        let (mut next, acting) = self.contact.apply_jvp(start, along, &v, hat)?;
+        let (mut next, acting) = (self.contact).apply_jvp(start, along, &v, hat, borne.as_ref())?;
         if let Some(closure) = &self.closure {
             let velocities = self.contact.velocities;
             next.y = closure.jvp(start, velocities, along, &next, [&v, &acting])?;
@@ -364,15 +406,16 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let before = &self.contact.velocities.before;
         let mut bar = StepBar::zeros(e);
-        let (mut v_bar, z) = match &self.closure {
+        let ([mut v_bar, z], mut borne_bar) = match &self.closure {
             None => self.contact.apply_vjp(start, next_bar, None, &mut bar)?,
             Some(closure) => {
                 let velocities = self.contact.velocities;
                 let own = closure.vjp(start, velocities, next_bar, &mut bar)?;
                 let [own_before, own_acting] = own.velocities;
                 let acting = Some(&own_acting);
-                let (v_bar, z) = self.contact.apply_vjp(start, &own.next, acting, &mut bar)?;
-                (v_bar + own_before, z)
+                let ([v_bar, z], borne_bar) =
+                    self.contact.apply_vjp(start, &own.next, acting, &mut bar)?;
+                ([v_bar + own_before, z], borne_bar)
             }
         };
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
@@ -386,6 +429,10 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         bar.add(s.dt, &e.force_vjp(before, &start.input.control, &z_total)?);
         bar.add(-1.0, &e.momentum_vjp(before, &w)?);
         start.momentum_vjp(&z_total, &mut bar)?;
+        if let Some(hold) = &self.hold {
+            borne_bar.frame += z_total;
+            hold.impulse_vjp(start, &borne_bar, &mut bar)?;
+        }
         Ok(bar)
     }
 }

@@ -20,6 +20,7 @@ mod end_contact;
 mod energy;
 mod euler;
 mod hessian;
+mod hold;
 mod middle_contact;
 mod midpoint;
 mod motion_push;

@@ -162,7 +162,12 @@ impl<'a> Stepper<'a> {
             Stages::RungeKutta(_) => Stops::default(),
         };
         let own = stages.contact_velocities();
-        let own = (own.into_iter()).flat_map(|c| [&c.before, &c.after].into_iter().chain(&c.end));
+        let own = (own.into_iter()).flat_map(|c| {
+            [&c.before, &c.after]
+                .into_iter()
+                .chain(&c.end)
+                .chain(&c.held)
+        });
         Ok(Piece {
             answers: e.answers(std::iter::once(v).chain(own)),
             next,

@@ -15,6 +15,8 @@ pub struct ContactVelocities {
     pub after: DVector<f64>,
     /// That at its end, where that isn't the one it moves by.
     pub end: Option<DVector<f64>>,
+    /// That by which contact bears something already at the step's start, where it does.
+    pub held: Option<DVector<f64>>,
 }
 
 impl ContactVelocities {
@@ -24,6 +26,7 @@ impl ContactVelocities {
             before,
             after,
             end: None,
+            held: None,
         }
     }
 

@@ -9,7 +9,7 @@ use super::tools::{RAIL, above_floor, contact, touching};
 use crate::support::{self, GRAVITY, run};
 use hydrograd::adjoint::lie::{Vec6, point_velocity};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::dynamics::{Evaluation, Input, Integrator, Linearisation, State, Stepper};
+use hydrograd::dynamics::{Dual, Evaluation, Input, Integrator, Linearisation, State, Stepper};
 use hydrograd::scene::Scene;
 use hydrograd::{Fidelity, Simulator};
 use nalgebra::DVector;
@@ -35,7 +35,16 @@ fn velocities<'a>(
     };
     let (_, record) = stepper.step(e, state, v, &input).unwrap();
     let velocities = record.contact_velocities().unwrap().clone();
-    [velocities.before, velocities.after]
+    let before = match velocities.held {
+        None => velocities.before,
+        // The one before has with it what contact bore already.
+        Some(_) => {
+            let impulse = stepper.dt * e.contact_force(&velocities.after, Dual::User);
+            let mass = e.mass_matrix().clone().cholesky().unwrap();
+            &velocities.after - mass.solve(&impulse)
+        }
+    };
+    [before, velocities.after]
 }
 
 /// ∫ s(g₀ − φ) of the law, from the compression x = g₀ − φ.

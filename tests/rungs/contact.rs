@@ -216,7 +216,7 @@ fn check(
         let only = |d: DVector<f64>| {
             DVector::from_fn(n, |i, _| if link.v.contains(&i) { d[i] } else { 0.0 })
         };
-        let (dq, dv) = (only(wavy(n, 2.1, 0.02)), only(wavy(n, 3.1, 0.1)));
+        let (dq, dv) = (only(wavy(n, 2.1, 0.02)), only(wavy(n, 3.2, 0.1)));
         list.push(Group {
             name: "q",
             slope: q.dot(&dq),

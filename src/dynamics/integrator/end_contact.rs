@@ -15,6 +15,7 @@ use super::stages::ContactVelocities;
 use super::start::Start;
 use super::{State, StateBar, StateTangents, StepBar, StepTangents};
 use crate::Result;
+use crate::dynamics::slopes::columns;
 use nalgebra::{DMatrix, DVector};
 
 /// The end of a step from the velocity and the frame momenta before contact, which have with them what it bears already.
@@ -30,7 +31,8 @@ pub(super) fn apply(
         let after = solve_pushed(start, &before, &-user, dt, &before, Resisting::AtStart)?;
         let mut velocities = ContactVelocities::new(before, after);
         velocities.held = Some(hold.velocity());
-        let next = ends(start, &velocities, hat - frame);
+        let carried = start.stepper.system.drift.carry(dt, frame);
+        let next = ends(start, &velocities, hat - carried);
         return Ok((next, velocities));
     }
     let after = solve(start, &before, dt, Resisting::AtStart)?;
@@ -131,7 +133,8 @@ impl<'s, 'a> Adjoint<'s, 'a> {
             }
         };
         if let Some(Push { frame, .. }) = borne {
-            hat -= frame;
+            let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
+            hat -= columns(frame, |p| drift.carry(dt, p.clone()));
         }
         let q = start.advance_jvp(&velocities.after, along.q, &after);
         let (problem, acting) = match &self.end {
@@ -181,9 +184,10 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         }
         let (held, user) = self.moved.solve_pushed_vjp(start, &after_bar, bar)?;
         before_bar += held;
+        let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
         let borne_bar = Push {
             user: -user,
-            frame: -&hat_bar,
+            frame: -drift.carry_back(dt, hat_bar.clone()),
         };
         Ok(([before_bar, hat_bar], borne_bar))
     }

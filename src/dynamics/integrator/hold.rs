@@ -8,6 +8,7 @@
 //! ```
 //!
 //! which is contact's convex problem ([`super::contact`]) beside the impulse Δt F. Any λ is as right: contact adds Δt g − λ to what the stage ends with. The better it is, the less is left to add.
+//! In a current the stage's own force carries on what it moves by, λ with it; what is taken off again is carried on as what contact adds is.
 
 use super::contact::{Problem, solve_pushed};
 use super::motion_push::Push;
@@ -16,7 +17,6 @@ use super::start::Start;
 use super::{Integrator, StepBar, StepTangents};
 use crate::Result;
 use crate::dynamics::Dual;
-use crate::dynamics::slopes::columns;
 use nalgebra::{DMatrix, DVector};
 
 /// v₀ and v_h, all driven velocities as they are in the step.
@@ -61,12 +61,11 @@ impl Hold {
 
     /// λ.
     pub fn impulse(&self, start: &Start) -> Push<DVector<f64>> {
-        let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
-        let reaction = self.reaction(start);
+        let (dt, reaction) = (start.stepper.dt, self.reaction(start));
         let borne = |dual| dt * reaction.force(&self.held, dual);
         Push {
             user: borne(Dual::User),
-            frame: drift.carry(dt, borne(Dual::Frame)),
+            frame: borne(Dual::Frame),
         }
     }
 
@@ -90,9 +89,7 @@ impl Hold {
         };
         Ok(Push {
             user: borne(Dual::User),
-            frame: columns(&borne(Dual::Frame), |p| {
-                s.system.drift.carry(s.dt, p.clone())
-            }),
+            frame: borne(Dual::Frame),
         })
     }
 
@@ -105,9 +102,9 @@ impl Hold {
     ) -> Result<()> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let reaction = self.reaction(start);
-        let frame = s.system.drift.carry_back(s.dt, impulse_bar.frame.clone());
+        let Push { user, frame } = impulse_bar;
         let mut held_bar = DVector::zeros(self.held.len());
-        for (z, dual) in [(&impulse_bar.user, Dual::User), (&frame, Dual::Frame)] {
+        for (z, dual) in [(user, Dual::User), (frame, Dual::Frame)] {
             let borne = reaction.force_vjp(&self.held, z, dual);
             bar.add(s.dt, &borne.force);
             held_bar += s.dt * borne.force.v;

@@ -446,7 +446,9 @@ impl Rollout {
         let mut progress = Progress::new("gradient: progress", progress, self.steps())?;
         let made = followed(py, &mut progress, move |interrupt| {
             objective.check(&rollout)?;
-            rollout.vjp_with(&objective.cotangents(&rollout), |done| interrupt.at(done))
+            rollout.vjp_with(&objective.try_cotangents(&rollout)?, |done| {
+                interrupt.at(done)
+            })
         });
         let made = ended(progress, made)?;
         gradient::of_rollout(py, &made)

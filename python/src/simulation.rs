@@ -387,7 +387,7 @@ impl Simulator {
             let all: Vec<&hydrograd::Rollout> = all.iter().map(Arc::as_ref).collect();
             let bars = all.iter().map(|rollout| {
                 objective.check(rollout)?;
-                Ok(objective.cotangents(rollout))
+                objective.try_cotangents(rollout)
             });
             let bars = bars.collect::<hydrograd::Result<Vec<_>>>()?;
             let (made, _) = inner.vjp_batch(&all, &bars, || interrupt.one_more())?;

@@ -290,7 +290,7 @@ pub(super) fn held_apart() -> Error {
     Error::Unsupported {
         what: "the flow on surfaces that a film holds apart".into(),
         why: "in a gap that the faces don't resolve the water's inertia is known, but not its pressure face by face".into(),
-        instead: "use more faces there, or ask before the gap closes".into(),
+        instead: "use more faces there, ask before the gap closes, or take the fidelity full, or no films (`films = false`)".into(),
     }
 }
 

@@ -178,8 +178,13 @@ fn base(
         (_, true) => "its root has no mass",
         _ => return Base::Free,
     };
+    let floats = |j: &urdf_rs::Joint| j.joint_type == urdf_rs::JointType::Floating;
+    let beside = match file.robot.joints.iter().any(floats) {
+        true => ", and what has a free joint floats on it",
+        false => "",
+    };
     report.note(format!(
-        "the base is fixed to the world, since {why}; `base` (--base) chooses"
+        "the base is fixed to the world, since {why}{beside}; `base` (--base) chooses"
     ));
     Base::Fixed
 }

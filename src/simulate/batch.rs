@@ -131,7 +131,7 @@ impl Simulator {
     ) -> Result<(Vec<Result<Gradient>>, BatchReport)> {
         let bars = rollouts.iter().map(|rollout| {
             objective.check(rollout)?;
-            Ok(objective.cotangents(rollout))
+            objective.try_cotangents(rollout)
         });
         let bars = bars.collect::<Result<Vec<_>>>()?;
         self.vjp_batch(rollouts, &bars, || ControlFlow::Continue(()))

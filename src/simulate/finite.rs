@@ -161,7 +161,7 @@ pub(super) fn blown_up(scene: &Scene, state: &State, mut error: Error) -> Error 
         ),
         quantity: "smallest eigenvalue of M(q), diagonal scaled to one,".into(),
         value: *value,
-        limit: least,
+        limit: 0.0,
         remedy: "the run blows up within this step, and nothing but rounding is left of the mass matrix: take a smaller time step, or the \
                  integrator midpoint"
             .into(),

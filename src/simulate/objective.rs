@@ -24,6 +24,14 @@ pub trait Objective {
 
     /// Its derivatives.
     fn cotangents(&self, rollout: &Rollout) -> Cotangents;
+
+    /// The same, which sweeps ask for, of an objective that may have none at a rollout that has a value.
+    ///
+    /// # Errors
+    /// Why there is none.
+    fn try_cotangents(&self, rollout: &Rollout) -> Result<Cotangents> {
+        Ok(self.cotangents(rollout))
+    }
 }
 
 impl Rollout {
@@ -52,7 +60,7 @@ impl Rollout {
     /// An objective that doesn't fit the scene, or as [`Rollout::vjp`].
     pub fn gradient(&self, objective: &dyn Objective) -> Result<Gradient> {
         objective.check(self)?;
-        self.vjp(&objective.cotangents(self))
+        self.vjp(&objective.try_cotangents(self)?)
     }
 }
 
@@ -214,7 +222,8 @@ impl Sum {
 impl Partwise for Sum {
     fn part(&self, part: &Part) -> Result<(f64, Cotangents)> {
         let own = self.of_part(part);
-        Ok((part.rollout.value(&own)?, own.cotangents(part.rollout)))
+        let value = part.rollout.value(&own)?;
+        Ok((value, own.try_cotangents(part.rollout)?))
     }
 }
 
@@ -381,16 +390,21 @@ impl Objective for Sum {
     }
 
     fn cotangents(&self, rollout: &Rollout) -> Cotangents {
+        // Not a number is refused by the sweep.
+        self.try_cotangents(rollout).unwrap_or_else(|_| {
+            let mut out = rollout.zero_cotangents();
+            out.density = f64::NAN;
+            out
+        })
+    }
+
+    fn try_cotangents(&self, rollout: &Rollout) -> Result<Cotangents> {
         let mut out = rollout.zero_cotangents();
         let columns = rollout.states().len();
         for term in &self.0 {
             let scale = term.weight / term.count(rollout);
             if let Some(sensed) = term.sensed_cotangents(rollout, scale) {
-                match sensed {
-                    Ok(sensed) => out.add(&sensed),
-                    // What fails is told by the check before; not a number is refused by the sweep.
-                    Err(_) => out.density = f64::NAN,
-                }
+                out.add(&sensed?);
                 continue;
             }
             let (bars, from) = match &term.of {
@@ -425,6 +439,6 @@ impl Objective for Sum {
                 }
             }
         }
-        out
+        Ok(out)
     }
 }

@@ -62,7 +62,7 @@ fn actuators_drive_joints() {
     says(
         added.report.to_string(),
         &[
-            "joint \"two\" has a servo (stiffness 32, damping 12)",
+            "joint \"two\" is a servo (stiffness 32, damping 12)",
             "[\"four\"] have no actuator",
             "ctrlrange of <general>",
         ],
@@ -76,13 +76,58 @@ fn actuators_drive_joints() {
     says(
         added.report.to_string(),
         &[
-            "joint \"two\" is a control, a force",
-            "joint \"four\" is a control, a force",
+            "how the actuator of joint \"two\" makes a force",
+            "how the actuator of joint \"four\" makes a force",
             "a second actuator of joint \"one\"",
             "joint \"round\" isn't read",
             "site of <motor>",
         ],
     );
+}
+
+/// Actuators of all kinds have the defaults of one another: what each sets is an attribute of them all.
+#[test]
+fn kinds_of_actuators_share_defaults() {
+    let of = |default: &str, element: &str| {
+        let text = format!(
+            r#"<mujoco><default>{default}</default><worldbody><body><joint name="j" axis="0 1 0"/><geom size="0.1"/></body></worldbody>
+            <actuator>{element}</actuator></mujoco>"#
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("one.xml");
+        std::fs::write(&path, text).unwrap();
+        drives(&Scene::from_urdf(&path, &Robot::default()).unwrap())[0]
+    };
+    let servo = |stiffness, damping| (true, Some([stiffness, damping]));
+    let affine = r#"<general biastype="affine" gainprm="60" biasprm="0 -60 -4"/>"#;
+    for (default, element, right) in [
+        (
+            r#"<general gear="10"/>"#,
+            r#"<position joint="j" kp="5" kv="1"/>"#,
+            servo(500.0, 100.0),
+        ),
+        (
+            r#"<motor gear="10"/>"#,
+            r#"<position joint="j" kp="5"/>"#,
+            servo(500.0, 0.0),
+        ),
+        (affine, r#"<position joint="j"/>"#, servo(60.0, 4.0)),
+        (affine, r#"<position joint="j" kp="7"/>"#, servo(7.0, 4.0)),
+        (affine, r#"<motor joint="j"/>"#, (true, None)),
+        (
+            r#"<position kp="50" kv="3"/>"#,
+            r#"<general joint="j"/>"#,
+            servo(50.0, 3.0),
+        ),
+        (
+            r#"<velocity kv="3"/>"#,
+            r#"<position joint="j" kp="2"/>"#,
+            servo(2.0, 3.0),
+        ),
+        ("", r#"<position joint="j"/>"#, servo(1.0, 0.0)),
+    ] {
+        assert_eq!(of(default, element), right, "{default} {element}");
+    }
 }
 
 /// All are controls where a file has no actuators, or tendons that drive who knows what; so they are as that is chosen.

@@ -1,5 +1,6 @@
 //! Sensors in the water: what they read, and gradients of what they read.
 
+use crate::support::says;
 use hydrograd::adjoint::lie::Vec3;
 use hydrograd::objective::{effort, final_flow, final_pressure, mean_flow, mean_pressure};
 use hydrograd::scene::{Body, Fluid, Scene, Shape};
@@ -165,4 +166,25 @@ fn what_cannot_be_read_is_told_by_name() {
     let still = simulator.rollout(&Controls::zeros(&simulator, 0)).unwrap();
     let text = still.sensor_pressure(0, &one).unwrap_err().to_string();
     assert!(text.contains("without steps"), "{text}");
+}
+
+/// Where a film is there are readings, but no derivatives of them: the gradient says that, and what there is instead.
+#[test]
+fn gradients_beside_a_film_say_why_there_is_none() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.time_step = 1e-3;
+    scene.add_wall([0.0; 3], [0.0, 0.0, 1.0]);
+    let ball = Body::new(Shape::sphere(0.03)).density(2700.0);
+    scene.add(ball.at([0.0, 0.0, 0.0309]));
+    let settings = Settings::default().fidelity(Fidelity::Reduced);
+    let goal = mean_pressure(Sensor::fixed([0.3, 0.0, 0.1]), 3.0, 1.0);
+    let simulator = Simulator::new(&scene, settings.clone()).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 3)).unwrap();
+    assert!(rollout.value(&goal).unwrap() > 0.0);
+    let error = rollout.gradient(&goal).unwrap_err();
+    says(error, &["film", "films = false", "full"]);
+    let simulator = Simulator::new(&scene, settings.films(false)).unwrap();
+    let rollout = simulator.rollout(&Controls::zeros(&simulator, 3)).unwrap();
+    assert!(rollout.gradient(&goal).is_ok());
 }

@@ -151,7 +151,7 @@ pub(super) fn solve_pushed(
         iterations: ITERATIONS,
         residual: now.residual,
         tolerance: RESIDUAL,
-        remedy: "contact doesn't converge: take a smaller time step or smaller contact.stiffness and limit_stiffness"
+        remedy: "contact doesn't converge: take a smaller time step, or smaller contact.stiffness, contact.friction and limit_stiffness"
             .into(),
     })
 }

@@ -221,7 +221,7 @@ impl<'a> Attempt<'a> {
         let rollout = self.run(simulator, x, steps, GraspStage::Descent)?;
         self.gradients.fetch_add(1, Ordering::Relaxed);
         goal.check(&rollout)?;
-        let seed = goal.cotangents(&rollout);
+        let seed = goal.try_cotangents(&rollout)?;
         let gradient = rollout.vjp_with(&seed, |_| self.watch(GraspStage::Descent))?;
         let mut controls = DMatrix::zeros(self.grip.limits.len(), simulator.steps());
         controls.columns_mut(0, steps).copy_from(&gradient.controls);

@@ -1,4 +1,4 @@
-//! What drives joints, as the actuators of an MJCF file do.
+//! What drives joints, as the actuators of an MJCF file do: all of them `<general>` ones by now ([`super::general`]), or of kinds that aren't read.
 
 use super::Made;
 use mjcf_rs::Model;
@@ -21,23 +21,15 @@ fn law(actuator: &Actuator) -> Law {
         given.as_deref().is_none_or(|given| plain.contains(&given))
     };
     let one = |all: &[f64], k: usize| all.get(k).copied().unwrap_or(0.0);
-    match actuator.kind {
-        ActuatorKind::Motor => Law::Force,
-        ActuatorKind::Position => {
-            Law::Servo([actuator.kp.unwrap_or(1.0), actuator.kv.unwrap_or(0.0)])
-        }
-        ActuatorKind::General => {
-            let lags = is(&actuator.dyn_type, &["none", "filter", "filterexact"]);
-            let bias = &actuator.biasprm;
-            let [k, c] = [-one(bias, 1), -one(bias, 2)];
-            let linear = actuator.bias_type.as_deref() == Some("affine");
-            match linear {
-                _ if !(lags && is(&actuator.gain_type, &["fixed"])) => Law::Other,
-                true if k > 0.0 && c >= 0.0 => Law::Servo([k, c]),
-                false if is(&actuator.bias_type, &["none"]) => Law::Force,
-                _ => Law::Other,
-            }
-        }
+    let lags = is(&actuator.dyn_type, &["none", "filter", "filterexact"]);
+    let plain = actuator.kind == ActuatorKind::General && is(&actuator.gain_type, &["fixed"]);
+    if !(plain && lags) {
+        return Law::Other;
+    }
+    let [k, c] = [1, 2].map(|i| -one(&actuator.biasprm, i));
+    match actuator.bias_type.as_deref() {
+        None | Some("none") => Law::Force,
+        Some("affine") if k != 0.0 => Law::Servo([k, c]),
         _ => Law::Other,
     }
 }

@@ -42,8 +42,6 @@ const GEOMS: &[&str] = &[
 pub(super) const DRIVES: [&str; 4] = ["motor", "position", "velocity", "general"];
 /// What attributes of an element of `<actuator>` are of.
 pub(super) const DRIVE: &str = "actuator";
-/// An element of `<actuator>` that isn't read, but for the joint that it drives.
-pub(super) const OTHER_DRIVE: &str = "another actuator";
 
 /// What an element of `<actuator>`, or of a class, is to [`read`].
 pub(super) fn kind(tag: &str) -> &str {

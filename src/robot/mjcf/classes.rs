@@ -88,6 +88,19 @@ impl<'e> Classes<'e> {
         Err(element.wrong(what))
     }
 
+    /// All elements that give defaults to one, by its class, or else by `around`: those of the outermost class first.
+    ///
+    /// # Errors
+    /// A class that isn't there.
+    pub fn given(&self, element: &Element, around: Option<usize>) -> Result<Vec<&'e Element>> {
+        let first = self.named(element, "class")?.or(around).unwrap_or(0);
+        let up = std::iter::successors(Some(first), |class| self.all[*class].parent);
+        let mut chain: Vec<usize> = up.collect();
+        chain.reverse();
+        let from = chain.into_iter().flat_map(|class| &self.all[class].from);
+        Ok(from.flat_map(|section| &section.children).collect())
+    }
+
     /// An element of this kind with all that it has by its class, or else by `around`, that of the bodies and frames around it: what is its own stands for what its
     /// class gives, and that for what the class has of those that it hangs on. Of sizes each number stands for itself.
     ///
@@ -99,13 +112,9 @@ impl<'e> Classes<'e> {
         kind: &str,
         around: Option<usize>,
     ) -> Result<Element> {
-        let first = self.named(element, "class")?.or(around).unwrap_or(0);
-        let up = std::iter::successors(Some(first), |class| self.all[*class].parent);
-        let mut chain: Vec<usize> = up.collect();
-        chain.reverse();
         let mut made = Element::at(&element.tag, element);
-        let given = (chain.iter()).flat_map(|class| &self.all[*class].from);
-        let given = given.flat_map(|section| section.all(kind));
+        let given = self.given(element, around)?.into_iter();
+        let given = given.filter(|e| e.tag == kind);
         // Names are each element's own.
         let given = given.flat_map(|e| e.attributes.iter().filter(|(name, _)| name != "name"));
         for (name, value) in given.chain(&element.attributes) {

@@ -1,8 +1,9 @@
 //! The file as one that leaves nothing to be looked up: no includes, no classes, and of elements and attributes those that are read.
 
-use super::attributes::{DRIVE, DRIVES, OTHER_DRIVE, numbers, read};
+use super::attributes::{DRIVE, numbers, read};
 use super::classes::Classes;
 use super::element::{Element, TURNS};
+use super::general::general;
 use super::geometry::{between, z_along};
 use crate::Result;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -55,16 +56,12 @@ pub(super) fn flat(file: &Element) -> Result<Element> {
     }
     for section in file.all("actuator") {
         for one in &section.children {
-            let kind = match DRIVES.contains(&&one.tag[..]) {
-                true => &one.tag[..],
-                false => OTHER_DRIVE,
-            };
-            let mut one = own(&classes.resolved(one, kind, None)?, DRIVE);
+            let mut made = own(&general(&classes, one)?, DRIVE);
             // Of a joint with one coordinate both are the same.
-            if let Some(joint) = one.get("jointinparent").map(String::from) {
-                one.set("joint", &joint);
+            if let Some(joint) = made.get("jointinparent").map(String::from) {
+                made.set("joint", &joint);
             }
-            actuator.children.push(one);
+            actuator.children.push(made);
         }
     }
     let joints = joints(&world);

@@ -10,6 +10,7 @@ mod classes;
 mod element;
 mod equalities;
 mod flat;
+mod general;
 mod geometry;
 mod includes;
 mod left_out;

@@ -88,7 +88,16 @@ impl Tendon {
         for (name, arm) in &self.arms {
             let at = place(&format!("arms.{name}"));
             let body = &scene.bodies[scene.named_body(name, at.clone())?.0];
-            if body.joint.coordinates() != 1 || body.mimic.is_some() {
+            if let Some(mimic) = &body.mimic {
+                let given = format!("{name:?}, whose joint follows that of {:?}", mimic.body);
+                let remedy = format!(
+                    "it has no coordinate of its own: give {:?} that arm times the ratio, {} m",
+                    mimic.body,
+                    arm * mimic.ratio
+                );
+                return Err(Error::input(at, given, remedy));
+            }
+            if body.joint.coordinates() != 1 {
                 return Err(Error::input(
                     at,
                     format!("a {} joint", body.joint.kind()),

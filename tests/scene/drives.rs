@@ -15,7 +15,7 @@ fn arm(of: &str) -> hydrograd::Result<(Scene, Added)> {
 fn arm_with(of: &str, options: &Robot) -> hydrograd::Result<(Scene, Added)> {
     let text = format!(
         r#"<mujoco><compiler angle="radian"/>
-        <default><position kp="40" kv="3"/><default class="weak"><position kp="8"/><general biastype="affine" gainprm="50" biasprm="0 -50 -2"/></default></default>
+        <default><position kp="40" kv="3"/><default class="weak"><position kp="8"/></default><default class="affine"><general biastype="affine" gainprm="50" biasprm="0 -50 -2"/></default></default>
         <worldbody><body name="a"><joint name="one" axis="0 1 0"/><geom type="sphere" size="0.05" pos="0.3 0 0" mass="0.2"/>
         <body name="b" pos="0.3 0 0"><joint name="two" axis="0 1 0"/><geom type="sphere" size="0.05" pos="0.3 0 0" mass="0.2"/>
         <body name="c" pos="0.3 0 0"><joint name="three" axis="0 1 0" damping="0.1"/><geom type="sphere" size="0.05" pos="0.3 0 0" mass="0.2"/>
@@ -47,7 +47,7 @@ fn drives(scene: &Scene) -> Vec<(bool, Option<[f64; 2]>)> {
 #[test]
 fn actuators_drive_joints() {
     let (scene, added) = arm(
-        r#"<actuator><position joint="one"/><position joint="two" class="weak" gear="2"/><general class="weak" jointinparent="three" ctrlrange="-1 1"/></actuator>"#,
+        r#"<actuator><position joint="one"/><position joint="two" class="weak" gear="2"/><general class="affine" jointinparent="three" ctrlrange="-1 1"/></actuator>"#,
     )
     .unwrap();
     assert_eq!(

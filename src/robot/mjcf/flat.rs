@@ -54,22 +54,20 @@ pub(super) fn flat(file: &Element) -> Result<Element> {
             }
         }
     }
-    for section in file.all("actuator") {
-        for one in &section.children {
-            let mut made = own(&general(&classes, one)?, DRIVE);
-            // Of a joint with one coordinate both are the same.
-            if let Some(joint) = made.get("jointinparent").map(String::from) {
-                made.set("joint", &joint);
-            }
-            actuator.children.push(made);
-        }
-    }
     let joints = joints(&world);
     for coupling in equality.all("joint") {
         has_one_coordinate(coupling, &joints)?;
     }
-    for drive in &actuator.children {
-        has_joint(drive, "joint", &joints, "the actuators")?;
+    for one in file.all("actuator").flat_map(|section| &section.children) {
+        for joint in ["joint", "jointinparent"] {
+            has_joint(one, joint, &joints, "the actuators")?;
+        }
+        let mut made = own(&general(&classes, one)?, DRIVE);
+        // Of a joint with one coordinate both are the same.
+        if let Some(joint) = made.get("jointinparent").map(String::from) {
+            made.set("joint", &joint);
+        }
+        actuator.children.push(made);
     }
     made.children = vec![compiler, asset, world, equality, actuator];
     Ok(made)

@@ -274,5 +274,8 @@ fn tendons_that_can_not_be_are_refused() {
     );
     let mut scene = wheels(good());
     scene.bodies[0].mimic = Some(Mimic::new("b"));
-    says(scene.validate().unwrap_err(), &["arms.a", "of their own"]);
+    says(
+        scene.validate().unwrap_err(),
+        &["arms.a", "coordinate of its own", "\"b\" that arm", "0.3 m"],
+    );
 }

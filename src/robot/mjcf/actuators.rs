@@ -71,7 +71,7 @@ impl Made<'_> {
                     }
                     drives.insert(joint.clone(), Some([k, c]));
                     format!(
-                        "joint {joint:?} has a servo (stiffness {k}, damping {c}): its control is where it shall be, rad or m, whatever gear and gain"
+                        "the file's actuator of joint {joint:?} is a servo (stiffness {k}, damping {c}): unless chosen otherwise its control is where the joint shall be, rad or m, whatever gear and gain"
                     )
                 }
                 Law::Force => {
@@ -81,7 +81,7 @@ impl Made<'_> {
                 Law::Other => {
                     drives.insert(joint.clone(), None);
                     format!(
-                        "joint {joint:?} is a control, a force or torque: how its actuator makes that of a control isn't read"
+                        "how the actuator of joint {joint:?} makes a force or torque of its control isn't read: unless chosen otherwise the control is that itself"
                     )
                 }
             };

@@ -67,6 +67,16 @@ pub(super) struct Adjoint<'s, 'a> {
     end: Option<End<'a>>,
 }
 
+/// Cotangents of what [`apply`] starts from.
+pub(super) struct EndBar {
+    /// Of the velocity before contact.
+    pub before: DVector<f64>,
+    /// Of the frame momenta before contact.
+    pub hat: DVector<f64>,
+    /// Of what contact bears already.
+    pub borne: Push<DVector<f64>>,
+}
+
 struct End<'a> {
     problem: Problem<'a>,
     motion: MotionPush,
@@ -154,15 +164,14 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         Ok((next, acting))
     }
 
-    /// Transpose of [`apply`]: cotangents of the velocity and of the momenta before contact, and of what it bears already, with that of the velocity with which contact acts from
-    /// elsewhere; the rest is added to `bar`.
+    /// Transpose of [`apply`], with the cotangent of the velocity with which contact acts from elsewhere; the rest is added to `bar`.
     pub fn apply_vjp(
         &self,
         start: &Start<'_, 'a>,
         next_bar: &StateBar,
         own: Option<&DVector<f64>>,
         bar: &mut StepBar,
-    ) -> Result<([DVector<f64>; 2], Push<DVector<f64>>)> {
+    ) -> Result<EndBar> {
         let (q_bar, mut after_bar) = start.advance_vjp(&self.velocities.after, &next_bar.q);
         bar.state.q += q_bar;
         let hat_bar = start.next_momentum_bar(next_bar);
@@ -185,10 +194,14 @@ impl<'s, 'a> Adjoint<'s, 'a> {
         let (held, user) = self.moved.solve_pushed_vjp(start, &after_bar, bar)?;
         before_bar += held;
         let (dt, drift) = (start.stepper.dt, &start.stepper.system.drift);
-        let borne_bar = Push {
+        let borne = Push {
             user: -user,
             frame: -drift.carry_back(dt, hat_bar.clone()),
         };
-        Ok(([before_bar, hat_bar], borne_bar))
+        Ok(EndBar {
+            before: before_bar,
+            hat: hat_bar,
+            borne,
+        })
     }
 }

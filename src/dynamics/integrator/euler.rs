@@ -406,32 +406,32 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let before = &self.contact.velocities.before;
         let mut bar = StepBar::zeros(e);
-        let ([mut v_bar, z], mut borne_bar) = match &self.closure {
+        let mut end = match &self.closure {
             None => self.contact.apply_vjp(start, next_bar, None, &mut bar)?,
             Some(closure) => {
                 let velocities = self.contact.velocities;
                 let own = closure.vjp(start, velocities, next_bar, &mut bar)?;
                 let [own_before, own_acting] = own.velocities;
                 let acting = Some(&own_acting);
-                let ([v_bar, z], borne_bar) =
-                    self.contact.apply_vjp(start, &own.next, acting, &mut bar)?;
-                ([v_bar + own_before, z], borne_bar)
+                let mut end = (self.contact).apply_vjp(start, &own.next, acting, &mut bar)?;
+                end.before += own_before;
+                end
             }
         };
         // v̄ of p̂⁺ through f; only the transpose of ∂f/∂v is needed here.
-        v_bar += s.dt * self.stage.rates_vjp(e, &z)?;
-        let w = self.stage.solve(e, split, &v_bar)?;
+        end.before += s.dt * self.stage.rates_vjp(e, &end.hat)?;
+        let w = self.stage.solve(e, split, &end.before)?;
         let tree = &e.system.tree;
         let [q_bar, _, hat_bar] =
             tree.chart_momentum_vjp(&e.q, &(s.dt * before), &self.reached, &w);
         bar.state.q += q_bar;
-        let z_total = z + hat_bar;
+        let z_total = end.hat + hat_bar;
         bar.add(s.dt, &e.force_vjp(before, &start.input.control, &z_total)?);
         bar.add(-1.0, &e.momentum_vjp(before, &w)?);
         start.momentum_vjp(&z_total, &mut bar)?;
         if let Some(hold) = &self.hold {
-            borne_bar.frame += z_total;
-            hold.impulse_vjp(start, &borne_bar, &mut bar)?;
+            end.borne.frame += z_total;
+            hold.impulse_vjp(start, &end.borne, &mut bar)?;
         }
         Ok(bar)
     }

@@ -68,7 +68,7 @@ fn actuators_drive_joints() {
         ],
     );
     let (scene, added) = arm(
-        r#"<actuator><motor joint="one" gear="5"/><velocity joint="two" kv="2"/><general joint="three" gainprm="3"/><general joint="four" biastype="muscle"/>
+        r#"<actuator><motor joint="one" gear="5"/><velocity joint="two" kv="2"/><general joint="three" gainprm="3" biastype="none"/><general joint="four" biastype="muscle"/>
         <position joint="one"/><motor joint="round"/><motor site="there"/></actuator>"#,
     )
     .unwrap();

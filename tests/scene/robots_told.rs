@@ -396,18 +396,23 @@ fn bowl_of(around: usize, along: usize, inner: f64) -> String {
     text
 }
 
-/// A closed mesh that can't be had with few faces has more, and that is said.
-#[test]
-fn closed_meshes_are_told_as_that() {
+/// What is told of a link of such a mesh, of which 20 faces are asked for.
+fn bowl_told(bowl: &str) -> String {
     let mesh = collision("<mesh filename=\"bowl.obj\"/>", "");
     let (folder, path) = file(&robot(&link("a", &mesh)));
-    std::fs::write(folder.path().join("bowl.obj"), bowl(0.9)).unwrap();
+    std::fs::write(folder.path().join("bowl.obj"), bowl).unwrap();
     let options = Robot {
         faces: Some(20),
         ..Robot::default()
     };
     let said = options.inspect(&path, &Fluid::fresh_water()).unwrap();
-    let said = said.to_string();
+    said.to_string()
+}
+
+/// A closed mesh that can't be had with few faces has more, and that is said.
+#[test]
+fn closed_meshes_are_told_as_that() {
+    let said = bowl_told(&bowl(0.9));
     says(
         &said,
         &[
@@ -476,15 +481,7 @@ fn meshes_inside_out_are_turned_round() {
 /// Of a closed mesh of very many faces that can't be had with few the hull stands for it, and that isn't laid to its not being closed.
 #[test]
 fn closed_meshes_too_fine_to_keep_are_told_as_that() {
-    let mesh = collision("<mesh filename=\"bowl.obj\"/>", "");
-    let (folder, path) = file(&robot(&link("a", &mesh)));
-    std::fs::write(folder.path().join("bowl.obj"), bowl_of(96, 60, 0.9995)).unwrap();
-    let options = Robot {
-        faces: Some(20),
-        ..Robot::default()
-    };
-    let said = options.inspect(&path, &Fluid::fresh_water()).unwrap();
-    let said = said.to_string();
+    let said = bowl_told(&bowl_of(96, 60, 0.9995));
     says(
         &said,
         &[

@@ -27,10 +27,10 @@ pub(super) fn apply(
 ) -> Result<(State, ContactVelocities)> {
     let dt = start.stepper.dt;
     if let Some(hold) = hold {
-        let Push { user, frame } = hold.impulse(start);
+        let (held, Push { user, frame }) = hold.into_parts();
         let after = solve_pushed(start, &before, &-user, dt, &before, Resisting::AtStart)?;
         let mut velocities = ContactVelocities::new(before, after);
-        velocities.held = Some(hold.velocity());
+        velocities.held = Some(held);
         let carried = start.stepper.system.drift.carry(dt, frame);
         let next = ends(start, &velocities, hat - carried);
         return Ok((next, velocities));

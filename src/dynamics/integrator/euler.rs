@@ -289,7 +289,7 @@ fn momentum(start: &Start, hold: Option<&Hold>) -> DVector<f64> {
     let p = start.momentum();
     match hold {
         None => p,
-        Some(hold) => p + hold.impulse(start).frame,
+        Some(hold) => p + &hold.impulse.frame,
     }
 }
 
@@ -382,11 +382,10 @@ impl<'a> StepDerivatives<'a> for Adjoint<'_, 'a> {
         let tree = &e.system.tree;
         let [by_q, _, by_hat] = tree.chart_momentum_slopes(&e.q, &(s.dt * before), &self.reached);
         // p̂ + Δt f at a given velocity; the stage's matrix holds what the velocity does.
-        let borne = self
-            .hold
-            .as_ref()
-            .map(|hold| hold.impulse_jvp(start, along));
-        let borne = borne.transpose()?;
+        let hold = self.hold.as_ref();
+        let borne = hold
+            .map(|hold| hold.impulse_jvp(start, along))
+            .transpose()?;
         let mut held = start.momentum_jvp(along)? + s.dt * force.along(q, None, inputs);
         if let Some(borne) = &borne {
             held += &borne.frame;

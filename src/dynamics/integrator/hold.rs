@@ -19,10 +19,12 @@ use crate::Result;
 use crate::dynamics::Dual;
 use nalgebra::{DMatrix, DVector};
 
-/// v₀ and v_h, all driven velocities as they are in the step.
+/// What is borne, and v₀ and v_h, all driven velocities as they are in the step.
 pub(super) struct Hold {
     start: DVector<f64>,
     held: DVector<f64>,
+    /// λ.
+    pub impulse: Push<DVector<f64>>,
 }
 
 impl Hold {
@@ -39,34 +41,35 @@ impl Hold {
         let v = start.split.complete(start.v);
         let push = s.dt * e.inertial_force(&v, &start.input.control)?;
         let held = solve_pushed(start, &v, &push, s.dt, &v, Resisting::AtStart)?;
-        Ok(near.touches(&held).then_some(Self { start: v, held }))
+        Ok(near.touches(&held).then(|| Self::of(start, v, held)))
     }
 
     /// Of a step that was made with the velocity `held`.
     pub fn made(start: &Start, held: &DVector<f64>) -> Self {
+        Self::of(start, start.split.complete(start.v), held.clone())
+    }
+
+    fn of(start: &Start, v: DVector<f64>, held: DVector<f64>) -> Self {
+        let reaction = Reaction::new(start, &v, Resisting::No);
+        let borne = |dual| start.stepper.dt * reaction.force(&held, dual);
+        let impulse = Push {
+            user: borne(Dual::User),
+            frame: borne(Dual::Frame),
+        };
         Self {
-            start: start.split.complete(start.v),
-            held: held.clone(),
+            start: v,
+            held,
+            impulse,
         }
     }
 
-    /// v_h.
-    pub fn velocity(self) -> DVector<f64> {
-        self.held
+    /// v_h and λ.
+    pub fn into_parts(self) -> (DVector<f64>, Push<DVector<f64>>) {
+        (self.held, self.impulse)
     }
 
     fn reaction<'r, 'a>(&'r self, start: &Start<'r, 'a>) -> Reaction<'r, 'a> {
         Reaction::new(start, &self.start, Resisting::No)
-    }
-
-    /// λ.
-    pub fn impulse(&self, start: &Start) -> Push<DVector<f64>> {
-        let (dt, reaction) = (start.stepper.dt, self.reaction(start));
-        let borne = |dual| dt * reaction.force(&self.held, dual);
-        Push {
-            user: borne(Dual::User),
-            frame: borne(Dual::Frame),
-        }
     }
 
     fn problem<'a>(&self, start: &Start<'_, 'a>) -> Result<Problem<'a>> {
@@ -74,7 +77,7 @@ impl Hold {
         Problem::pushed(start, &self.start, &self.held, dt, Resisting::AtStart)
     }
 
-    /// Tangents of [`Hold::impulse`].
+    /// Tangents of λ.
     pub fn impulse_jvp(&self, start: &Start, along: &StepTangents) -> Result<Push<DMatrix<f64>>> {
         let (s, e, split) = (start.stepper, start.e, start.split);
         let mut v = along.v.clone();
@@ -93,7 +96,7 @@ impl Hold {
         })
     }
 
-    /// Transpose of [`Hold::impulse`], added to `bar`.
+    /// Transpose of [`Hold::impulse_jvp`], added to `bar`.
     pub fn impulse_vjp(
         &self,
         start: &Start,

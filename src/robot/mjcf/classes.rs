@@ -3,10 +3,8 @@
 use super::element::Element;
 use crate::Result;
 
-/// The elements that have defaults.
-pub(super) const KINDS: [&str; 9] = [
-    "geom", "joint", "site", "mesh", "equality", "motor", "position", "velocity", "general",
-];
+/// The elements that have defaults, beside those of `<actuator>`.
+pub(super) const KINDS: [&str; 5] = ["geom", "joint", "site", "mesh", "equality"];
 /// What may have fewer numbers than there are: the others stay those of the class.
 const PADDED: &str = "size";
 /// The class that the others hang on.

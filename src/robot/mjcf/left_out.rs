@@ -111,7 +111,7 @@ impl<'p> LeftOut<'p> {
         for inner in &section.children {
             match &inner.tag[..] {
                 "default" => self.class(inner, name)?,
-                kind if KINDS.contains(&kind) => {
+                kind if KINDS.contains(&kind) || DRIVES.contains(&kind) => {
                     self.leaf(inner, attributes::kind(kind), &of)?;
                     if inner.get("name").is_some() {
                         self.note(format!("name of <{kind}> of <default>"), inner);

@@ -91,6 +91,7 @@ fn to_dict<'py>(py: Python<'py>, text: serde_json::Result<String>) -> PyResult<B
 pub struct Robot {
     bodies: BTreeMap<String, usize>,
     joints: BTreeMap<String, usize>,
+    thrusters: Vec<String>,
     report: RobotReport,
 }
 
@@ -106,6 +107,12 @@ impl Robot {
     #[getter]
     fn joints(&self) -> BTreeMap<String, usize> {
         self.joints.clone()
+    }
+
+    /// Names of its thrusters, forces of the scene: actuators of sites in MJCF files.
+    #[getter]
+    fn thrusters(&self) -> Vec<String> {
+        self.thrusters.clone()
     }
 
     /// What it came to, as `inspect_robot` gives it.
@@ -130,6 +137,7 @@ impl Robot {
         Self {
             bodies: added.bodies.iter().map(named).collect(),
             joints: added.joints.into_iter().map(|(j, id)| (j, id.0)).collect(),
+            thrusters: added.thrusters,
             report: added.report,
         }
     }

@@ -66,7 +66,7 @@ pub use parameters::{
 };
 pub use shapes::{Follows, Shapes};
 pub use slopes::{InputTangents, Slopes};
-pub use stiffness::Damping;
+pub use stiffness::Fastest;
 pub use symmetry::FreeMotions;
 pub(crate) use symmetry::{Group, free_motions, refuse, refuse_tilt};
 pub use system::{Drive, System};

@@ -1,21 +1,30 @@
-//! How fast forces that depend on the velocity slow what moves: what explicit integrators must resolve.
+//! How fast forces slow what moves, and how fast they swing it: what integrators that take them explicitly must resolve.
 //!
-//! With D = ∂g/∂v, g being the forces in the user's coordinates without the water's inertia, the rates are the eigenvalues of M^-½ ½(−D − Dᵀ) M^-½ on the coordinates
-//! that nothing drives. Of many bodies that are coupled by products M is what each tree has alone.
+//! g being the forces in the user's coordinates without the water's inertia, D = −∂g/∂v and K = −∂g/∂q at rest, both their symmetric parts on the coordinates that nothing drives, the rates are the
+//! eigenvalues of M^-½ D M^-½, and the angular frequencies the roots of those of M^-½ K M^-½. A step that moves by the velocity in which it has solved for D is stable while Δt² K < 4 (M + ½ Δt D): for it
+//! M + ½ Δt D stands in place of M. Of many bodies that are coupled by products M is what each tree has alone.
 
 use super::fluid::FluidMomenta;
 use super::force::{ForceModel, Loads, Velocity};
+use super::islands::Islands;
 use super::{Drive, Evaluation, Parameters, System};
 use crate::Result;
 use nalgebra::{DMatrix, DVector};
 
-/// The fastest of the rates.
+/// The fastest of rates, or of angular frequencies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Damping {
-    /// 1/s.
+pub struct Fastest {
+    /// 1/s, or rad/s.
     pub rate: f64,
-    /// The body whose joint it slows most.
+    /// The body whose joint it slows or swings most.
     pub body: usize,
+}
+
+/// Two symmetric matrices, as products with [`Islands::changes`]: the largest eigenvalue of the first by the second is looked for.
+struct Pencil {
+    islands: Islands,
+    of: Vec<DVector<f64>>,
+    by: Vec<DVector<f64>>,
 }
 
 impl System {
@@ -31,50 +40,69 @@ impl System {
         control: &DVector<f64>,
         time: f64,
         enough: f64,
-    ) -> Result<Option<Damping>> {
+    ) -> Result<Option<Fastest>> {
+        self.fastest(parameters, q, time, enough, |e| e.slowing(v, control))
+    }
+
+    /// The largest angular frequency at which forces swing what rests at `time` (s), if it is above `enough` (rad/s), in steps of `implicit` (s) that solve for the velocity in forces, if they do.
+    /// Water is asked for its inertia only where the bodies' own is too small.
+    ///
+    /// # Errors
+    /// As [`System::evaluate`].
+    pub fn swinging(
+        &self,
+        parameters: &Parameters,
+        q: &DVector<f64>,
+        control: &DVector<f64>,
+        time: f64,
+        implicit: Option<f64>,
+        enough: f64,
+    ) -> Result<Option<Fastest>> {
+        let pencil = |e: &Evaluation| e.swinging(control, implicit);
+        let found = self.fastest(parameters, q, time, enough * enough, pencil)?;
+        Ok(found.map(|Fastest { rate, body }| Fastest {
+            rate: rate.sqrt(),
+            body,
+        }))
+    }
+
+    /// The largest eigenvalue of all pencils' if it is above `enough`.
+    fn fastest(
+        &self,
+        parameters: &Parameters,
+        q: &DVector<f64>,
+        time: f64,
+        enough: f64,
+        pencil: impl Fn(&Evaluation) -> Pencil,
+    ) -> Result<Option<Fastest>> {
         let kinematics = self.kinematics(q)?;
         let (still, report) = (FluidMomenta::Still, Default::default());
         let dry = Evaluation::new(self, parameters, q, time, kinematics, still, report);
         // The water only adds to the inertia, but where a given added mass is smaller than what others change of it.
-        let fast = |d: &Damping| d.rate > enough;
-        let alone = dry.fastest(v, control);
-        let is_slow = matches!(&alone, Ok(found) if found.is_none_or(|d| !fast(&d)));
+        let fast = |found: &Fastest| found.rate > enough;
+        let alone = self.fastest_of(&pencil(&dry));
+        let is_slow = matches!(&alone, Ok(found) if found.is_none_or(|found| !fast(&found)));
         if is_slow || !self.in_water(parameters) {
             return Ok(alone.ok().flatten().filter(fast));
         }
         let wet = self.evaluate_apart(parameters, q, time)?;
-        Ok(wet.fastest(v, control).ok().flatten().filter(fast))
+        Ok(self.fastest_of(&pencil(&wet)).ok().flatten().filter(fast))
     }
-}
 
-/// An inertia that isn't positive definite.
-struct Indefinite;
-
-impl Evaluation<'_> {
-    /// None where nothing is slowed.
-    fn fastest(
-        &self,
-        v: &DVector<f64>,
-        control: &DVector<f64>,
-    ) -> std::result::Result<Option<Damping>, Indefinite> {
-        let system = self.system;
-        let mut free = vec![None; v.len()];
-        for (b, (drive, link)) in system.drives.iter().zip(system.tree.links()).enumerate() {
+    /// None of a first matrix that is zero.
+    fn fastest_of(&self, pencil: &Pencil) -> std::result::Result<Option<Fastest>, Indefinite> {
+        let Pencil { islands, of, by } = pencil;
+        if of.iter().all(|column| column.iter().all(|x| *x == 0.0)) {
+            return Ok(None);
+        }
+        let mut free = vec![None; islands.velocities()];
+        for (b, (drive, link)) in self.drives.iter().zip(self.tree.links()).enumerate() {
             if *drive == Drive::Free {
                 link.v.clone().for_each(|i| free[i] = Some(b));
             }
         }
-        let islands = self.islands();
-        let changes = islands.changes();
-        let slowed = self.load_rates(self.system.smooth_forces(), v, control, &changes);
-        if slowed.iter().all(|column| column.iter().all(|x| *x == 0.0)) {
-            return Ok(None);
-        }
-        let inertia: Vec<_> = changes.iter().map(|v| self.mass_alone_times(v)).collect();
-        let mut found: Option<Damping> = None;
-        for ((island, slowed), (_, inertia)) in
-            islands.blocks(&slowed).zip(islands.blocks(&inertia))
-        {
+        let mut found: Option<Fastest> = None;
+        for ((island, of), (_, by)) in islands.blocks(of).zip(islands.blocks(by)) {
             let own: Vec<usize> = (0..island.len())
                 .filter(|k| free[island[*k]].is_some())
                 .collect();
@@ -82,17 +110,64 @@ impl Evaluation<'_> {
                 let m = m.select_rows(&own).select_columns(&own);
                 0.5 * (&m + m.transpose())
             };
-            let (slowed, inertia) = (-block(&slowed), block(&inertia));
-            if slowed.iter().all(|x| *x == 0.0) {
+            let (of, by) = (block(&of), block(&by));
+            if of.iter().all(|x| *x == 0.0) {
                 continue;
             }
-            let (rate, at) = largest(inertia, &slowed).ok_or(Indefinite)?;
-            if found.is_none_or(|d| rate > d.rate) {
+            let (rate, at) = largest(by, &of).ok_or(Indefinite)?;
+            if found.is_none_or(|other| rate > other.rate) {
                 let body = free[island[own[at]]];
-                found = body.map(|body| Damping { rate, body });
+                found = body.map(|body| Fastest { rate, body });
             }
         }
         Ok(found)
+    }
+}
+
+/// An inertia that isn't positive definite.
+struct Indefinite;
+
+impl Evaluation<'_> {
+    /// D by M.
+    fn slowing(&self, v: &DVector<f64>, control: &DVector<f64>) -> Pencil {
+        let islands = self.islands();
+        let changes = islands.changes();
+        Pencil {
+            of: self.slowed(v, control, &changes),
+            by: changes.iter().map(|v| self.mass_alone_times(v)).collect(),
+            islands,
+        }
+    }
+
+    /// K by M, or by M + ½ Δt D, at rest.
+    fn swinging(&self, control: &DVector<f64>, implicit: Option<f64>) -> Pencil {
+        let islands = self.islands();
+        let changes = islands.changes();
+        let rest = DVector::zeros(islands.velocities());
+        let held = |z: &DVector<f64>| -self.user_loads_vjp(&rest, control, z).q;
+        let mut by: Vec<_> = changes.iter().map(|v| self.mass_alone_times(v)).collect();
+        if let Some(dt) = implicit {
+            let slowed = self.slowed(&rest, control, &changes);
+            by.iter_mut()
+                .zip(&slowed)
+                .for_each(|(m, d)| *m += 0.5 * dt * d);
+        }
+        Pencil {
+            of: changes.iter().map(held).collect(),
+            by,
+            islands,
+        }
+    }
+
+    fn slowed(
+        &self,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+        changes: &[DVector<f64>],
+    ) -> Vec<DVector<f64>> {
+        let mut out = self.load_rates(self.system.smooth_forces(), v, control, changes);
+        out.iter_mut().for_each(DVector::neg_mut);
+        out
     }
 
     /// ∂g/∂v of these forces, times `changes`; user coordinates.
@@ -128,9 +203,9 @@ impl Evaluation<'_> {
 }
 
 /// The largest eigenvalue of M^-½ S M^-½, and the coordinate that is most of its direction; none where M isn't positive definite.
-fn largest(m: DMatrix<f64>, slowed: &DMatrix<f64>) -> Option<(f64, usize)> {
+fn largest(m: DMatrix<f64>, s: &DMatrix<f64>) -> Option<(f64, usize)> {
     let lower = m.cholesky()?.unpack();
-    let half = lower.solve_lower_triangular(slowed)?;
+    let half = lower.solve_lower_triangular(s)?;
     let scaled = lower.solve_lower_triangular(&half.transpose())?;
     if !scaled.iter().all(|x| x.is_finite()) {
         return None;

@@ -57,6 +57,22 @@ pub(crate) struct Folded {
     pub at: Isometry3<f64>,
 }
 
+/// What pushes a body.
+#[derive(Clone, Debug)]
+pub(crate) struct RobotThruster {
+    pub name: String,
+    /// Number of the body.
+    pub body: usize,
+    /// m, body's frame.
+    pub at: [f64; 3],
+    /// Of length one, body's frame.
+    pub direction: [f64; 3],
+    /// N a unit of its control.
+    pub push: f64,
+    /// Moment about the direction per newton, m.
+    pub torque: f64,
+}
+
 /// A robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Imported {
@@ -64,6 +80,7 @@ pub(crate) struct Imported {
     /// Parents before children.
     pub bodies: Vec<RobotBody>,
     pub folded: Vec<Folded>,
+    pub thrusters: Vec<RobotThruster>,
     pub report: Report,
 }
 
@@ -157,8 +174,26 @@ pub(crate) fn import(path: &Path, options: &Options) -> Result<Imported> {
         base,
         bodies: made,
         folded,
+        thrusters: thrusters(&file, &groups),
         report,
     })
+}
+
+fn thrusters(file: &File, groups: &[Group]) -> Vec<RobotThruster> {
+    let parts =
+        || (groups.iter().enumerate()).flat_map(|(b, g)| g.parts.iter().map(move |p| (b, p)));
+    let each = file.thrusters.iter().filter_map(|given| {
+        let (body, part) = parts().find(|(_, p)| file.robot.links[p.link].name == given.link)?;
+        Some(RobotThruster {
+            name: given.name.clone(),
+            body,
+            at: part.at.translation.vector.into(),
+            direction: (part.at.rotation * nalgebra::Vector3::from(given.axis)).into(),
+            push: given.push,
+            torque: given.torque,
+        })
+    });
+    each.collect()
 }
 
 /// Whether the root hangs on the world: as chosen, else if it is called so or has no mass.

@@ -25,6 +25,8 @@ pub(super) struct File {
     pub extras: HashMap<String, Extra>,
     /// Joints that are driven, by name, and the stiffness and damping of those that are held at a target; none of a file that doesn't say.
     pub drives: Option<HashMap<String, Option<[f64; 2]>>>,
+    /// What pushes at links.
+    pub thrusters: Vec<SiteThruster>,
     /// Shapes that URDF lacks, by the name that stands in a mesh's place.
     pub shapes: HashMap<String, Shape>,
     /// What is to be told.
@@ -43,6 +45,7 @@ impl File {
             unused: Vec::new(),
             extras: HashMap::new(),
             drives: None,
+            thrusters: Vec::new(),
             shapes: HashMap::new(),
             notes: Vec::new(),
             coupled_by: "<mimic>",
@@ -61,6 +64,19 @@ pub(super) struct Extra {
     pub armature: f64,
     /// Coordinate at which it starts unless told otherwise.
     pub start: f64,
+}
+
+/// What pushes the body of a link.
+pub(super) struct SiteThruster {
+    pub name: String,
+    /// The link, at whose origin it is.
+    pub link: String,
+    /// Along which it pushes, link's frame, of length one.
+    pub axis: [f64; 3],
+    /// N a unit of its control.
+    pub push: f64,
+    /// Moment about the axis per newton, m.
+    pub torque: f64,
 }
 
 /// What stands at a joint.

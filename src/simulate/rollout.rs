@@ -171,7 +171,7 @@ impl Rollout {
     }
 
     /// What the user should know about this trajectory, with names and numbers: gaps that the
-    /// meshes don't resolve, and bodies in one another with the fidelity `isolated`; drag too stiff for an explicit integrator's step, and
+    /// meshes don't resolve, and bodies in one another with the fidelity `isolated`; drag or springs too stiff for the integrator's step, and
     /// energy that comes from nowhere; bodies that leave water which doesn't end with its surface.
     pub fn warnings(&self) -> Vec<String> {
         // Where bodies don't feel each other nothing is to be resolved.

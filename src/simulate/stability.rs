@@ -1,4 +1,4 @@
-//! What tells that a run isn't to be trusted: drag too stiff for an explicit integrator's step, and energy that comes from nowhere.
+//! What tells that a run isn't to be trusted: drag or springs too stiff for an integrator's step, and energy that comes from nowhere.
 //!
 //! Energy may come from controls, which have done at most Σ Δt Σ |uᵢ| |rᵢ| by a state, rᵢ being the faster of a control's rates at both ends of a step; from a motion
 //! that drives a joint or a current past what doesn't drift, whose work isn't known, but is of the order of the kinetic energy of all bodies at the speeds that these give
@@ -20,7 +20,7 @@ const SOON: usize = 20;
 const RUNAWAY: f64 = 1e4;
 
 impl Simulator {
-    /// What the user should know before a run of drag at the start, where the integrator takes it explicitly.
+    /// What the user should know before a run of drag and of springs at the start, where the integrator takes them explicitly.
     pub fn start_stiffness_warning(&self) -> Option<String> {
         let (q, v) = (&self.assembled.q, &self.assembled.v);
         let control = DVector::zeros(self.system().controls);
@@ -29,6 +29,16 @@ impl Simulator {
 
     /// The same of one state.
     fn stiffness(
+        &self,
+        time: f64,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+        control: &DVector<f64>,
+    ) -> Option<String> {
+        (self.stiff_damping(time, q, v, control)).or_else(|| self.stiff_spring(time, q, control))
+    }
+
+    fn stiff_damping(
         &self,
         time: f64,
         q: &DVector<f64>,
@@ -52,10 +62,28 @@ impl Simulator {
             limit / damping.rate
         ))
     }
+
+    fn stiff_spring(&self, time: f64, q: &DVector<f64>, control: &DVector<f64>) -> Option<String> {
+        let (integrator, dt) = (self.stepper().integrator, self.time_step());
+        let limit = integrator.swing_limit()?;
+        let implicit = integrator.damping_limit().is_none().then_some(dt);
+        let (system, parameters) = (self.system(), self.parameters());
+        let found = system.swinging(parameters, q, control, time, implicit, limit / dt);
+        let swing = found.ok().flatten()?;
+        let name = &system.bodies[swing.body].name;
+        Some(format!(
+            "springs, or other forces of the place, swing body {name:?} by {:.3e} rad/s at t = {} s, {:.3} rad in the time step of {dt} s, where the integrator {integrator:?}, which takes them where a \
+             step starts, is stable up to {limit:.3}: the run, or its gradient, may grow without bound; take a time step under {:.2e} s, softer springs, or the integrator midpoint",
+            swing.rate,
+            readable(time),
+            swing.rate * dt,
+            limit / swing.rate
+        ))
+    }
 }
 
 impl Rollout {
-    /// Drag too stiff for an explicit step at the start, or where all is fastest.
+    /// Drag or springs too stiff for a step at the start, or where all is fastest.
     pub(super) fn stiffness_warning(&self) -> Option<String> {
         let samples = self.samples();
         let fastest = (samples.iter()).max_by(|a, b| a.kinetic_energy.total_cmp(&b.kinetic_energy));
@@ -106,7 +134,7 @@ impl Rollout {
                     .into()
             }
             false => format!(
-                "the time step of {} s is too long for these velocities or this drag; take a smaller one{}",
+                "the time step of {} s is too long for these velocities, this drag or these springs; take a smaller one{}",
                 self.simulator.time_step(),
                 self.finer_integrator()
             ),
@@ -168,7 +196,7 @@ impl Rollout {
         let (s, worked) = each.find(|(s, worked)| s.kinetic_energy > reach(**worked))?;
         Some(format!(
             "the kinetic energy is {:.3e} J at t = {} s, far beyond the {:.3e} J that motions, current and controls account for: the time step of {} s is too long for these \
-             velocities or this drag; take a smaller one, or the integrator midpoint",
+             velocities, this drag or these springs; take a smaller one, or the integrator midpoint",
             s.kinetic_energy,
             s.time,
             given + worked,

@@ -34,6 +34,7 @@ mod shapes;
 #[cfg(feature = "opt")]
 mod smoothing;
 mod soak;
+mod stiff;
 mod swimmer;
 mod trees;
 mod vehicle;

@@ -3,9 +3,11 @@
 use super::robots::{collision, joint, link, read, refused_with, robot};
 use crate::support::says;
 use hydrograd::scene::{
-    Added, Drag, Followers, Motion, Passive, Robot, RobotJoint, RobotLink, Scene, Servo,
+    Added, Body, Drag, Followers, Joint, Motion, Passive, Robot, RobotJoint, RobotLink, Scene,
+    Servo, Thruster,
 };
 use hydrograd::{Controls, Fidelity, Fluid, Settings, Simulator};
+use nalgebra::{DMatrix, Quaternion, UnitQuaternion, Vector3, Vector6};
 
 /// An arm of four links in a row, each with a mass at its end, and what drives it.
 fn arm(of: &str) -> hydrograd::Result<(Scene, Added)> {
@@ -69,7 +71,7 @@ fn actuators_drive_joints() {
     );
     let (scene, added) = arm(
         r#"<actuator><motor joint="one" gear="5"/><velocity joint="two" kv="2"/><general joint="three" gainprm="3" biastype="none"/><general joint="four" biastype="muscle"/>
-        <position joint="one"/><motor joint="round"/><motor site="there"/></actuator>"#,
+        <position joint="one"/><motor joint="round"/><motor body="a"/></actuator>"#,
     )
     .unwrap();
     assert_eq!(drives(&scene), [(true, None); 4]);
@@ -80,7 +82,7 @@ fn actuators_drive_joints() {
             "how the actuator of joint \"four\" makes a force",
             "a second actuator of joint \"one\"",
             "joint \"round\" isn't read",
-            "site of <motor>",
+            "body of <motor>",
         ],
     );
 }
@@ -181,6 +183,108 @@ fn joints_are_controls_where_nothing_is_known() {
             (true, Some([5.0, 0.0]))
         ]
     );
+}
+
+/// A vehicle with sites that are turned, one on a part that is welded on, and actuators of them.
+fn vehicle(of: &str, options: &Robot) -> hydrograd::Result<(Scene, Added)> {
+    let text = format!(
+        r#"<mujoco><compiler angle="degree"/><default><motor gear="0 0 3 0 0 0.6"/></default>
+        <worldbody><site name="nowhere"/><body name="hull" quat="0.5 0.5 0.5 0.5"><freejoint/><geom type="ellipsoid" size="0.3 0.2 0.1" mass="20"/>
+        <site name="port" pos="-0.2 0.1 0.05" euler="0 90 0"/><site name="up" pos="0 0 0.1"/>
+        <body name="wing" pos="0 0.2 0" euler="90 0 0"><geom type="sphere" size="0.02" mass="0.1"/><site name="tip" pos="0 0 0.1"/></body>
+        </body></worldbody><actuator>{{of}}</actuator></mujoco>"#
+    )
+    .replace("{of}", of);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("vehicle.xml");
+    std::fs::write(&path, text).unwrap();
+    let mut scene = Scene::new(Fluid::none());
+    let added = scene.add_robot(&path, options)?;
+    Ok((scene, added))
+}
+
+/// Actuators of sites push where the file has them: wrenches by hand, in the world.
+#[test]
+fn actuators_of_sites_are_thrusters() {
+    let of = r#"<motor name="aft" site="port"/><general site="tip" gainprm="5" gear="2 0 0"/><motor site="up" gear="0 -1 0 0 0.25 0"/>"#;
+    let (mut scene, added) = vehicle(of, &Robot::default()).unwrap();
+    assert_eq!(added.thrusters, ["aft", "tip thruster", "up thruster"]);
+    assert_eq!(scene.control_labels(), added.thrusters);
+    says(
+        added.report.to_string(),
+        &["site \"tip\" is the thruster \"tip thruster\", 10 N a unit"],
+    );
+    scene.gravity = [0.0; 3];
+    let sim = Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap();
+    let hull = scene.body("hull").unwrap().0;
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(0.5, 0.5, 0.5, 0.5));
+    // Where each is, force and moment there, in the hull's frame: "port" is turned by 90° about y, and the wing, by 90° about x, has z along −y.
+    let three = [
+        ([-0.2, 0.1, 0.05], [3.0, 0.0, 0.0], [0.6, 0.0, 0.0]),
+        ([0.0, 0.1, 0.0], [10.0, 0.0, 0.0], [0.0; 3]),
+        ([0.0, 0.0, 0.1], [0.0, -1.0, 0.0], [0.0, 0.25, 0.0]),
+    ];
+    for (k, (at, force, moment)) in three.into_iter().enumerate() {
+        let [at, force, moment] = [at, force, moment].map(Vector3::from);
+        let command = DMatrix::from_fn(3, 1, |i, _| f64::from(i == k));
+        let controls = Controls::from_matrix(&sim, command).unwrap();
+        let loads = sim.rollout(&controls).unwrap().loads(0).unwrap();
+        let found: Vector6<f64> = loads
+            .kinds()
+            .map(|kind| loads.wrenches(kind).unwrap()[hull])
+            .sum();
+        let [force, moment] = [force, moment + at.cross(&force)].map(|x| rotation * x);
+        let right = Vector6::from_row_slice(&[force.as_slice(), moment.as_slice()].concat());
+        assert!((found - right).norm() < 1e-12, "{k}: {found} for {right}");
+    }
+}
+
+/// What isn't a thruster is told, or refused where the file is wrong.
+#[test]
+fn actuators_of_sites_that_are_no_thrusters_are_told() {
+    let none = |of: &str, why: &str| {
+        let (scene, added) = vehicle(of, &Robot::default()).unwrap();
+        assert!(
+            scene.forces.is_empty() && added.thrusters.is_empty(),
+            "{of}"
+        );
+        says(added.report.to_string(), &[why]);
+    };
+    none(r#"<motor site="nowhere"/>"#, "sites of the world");
+    none(r#"<motor site="up" gear="0 0 0 0 0 1"/>"#, "has no force");
+    none(
+        r#"<motor site="up" gear="1 0 0 0 1 0"/>"#,
+        "isn't about the axis",
+    );
+    none(
+        r#"<position site="up" kp="3"/>"#,
+        "isn't a multiple of its control",
+    );
+    none(r#"<motor site="up" refsite="tip"/>"#, "refsite of <motor>");
+    let error = vehicle(r#"<motor site="where"/>"#, &Robot::default()).unwrap_err();
+    says(
+        error.to_string(),
+        &["no such site", "where", "the actuators"],
+    );
+    let mut scene = Scene::new(Fluid::none());
+    scene.add(
+        Body::dry()
+            .named("old")
+            .mass(1.0)
+            .inertia([1.0; 3])
+            .joint(Joint::Free),
+    );
+    scene.add_force(Thruster::new("old").named("one").into());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("other.xml");
+    let text = r#"<mujoco><worldbody><body name="other"><freejoint/><geom size="0.1"/><site name="s"/></body></worldbody><actuator><motor name="one" site="s"/></actuator></mujoco>"#;
+    std::fs::write(&path, text).unwrap();
+    let error = scene.add_robot(&path, &Robot::default()).unwrap_err();
+    says(error.to_string(), &["one", "prefix"]);
+    let apart = Robot::default().prefix("b ");
+    let added = scene.add_robot(&path, &apart).unwrap();
+    assert_eq!(added.thrusters, ["b one"]);
+    scene.validate().unwrap();
 }
 
 /// What drives a follower drives its leader, at the lever that it has there.

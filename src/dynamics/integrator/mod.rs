@@ -87,6 +87,19 @@ impl Integrator {
         }
     }
 
+    /// Largest angular frequency times the time step at which it is stable, of integrators that take forces where a step starts: a swing grows beyond 2 without bound (the Eulers, which are symplectic) or
+    /// beyond √8 (RK4). Of RK2, with which all swings grow, the one that grows by an eighth a radian.
+    pub fn swing_limit(self) -> Option<f64> {
+        match self {
+            Integrator::MomentumEuler | Integrator::EnergyEuler | Integrator::VelocityEuler => {
+                Some(2.0)
+            }
+            Integrator::Rk2 => Some(1.0),
+            Integrator::Rk4 => Some(std::f64::consts::SQRT_2 * 2.0),
+            Integrator::Midpoint => None,
+        }
+    }
+
     /// Answers of the water that are kept of a step, where many bodies are coupled by products.
     pub(crate) fn answers(self) -> usize {
         match self {

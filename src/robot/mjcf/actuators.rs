@@ -1,4 +1,4 @@
-//! What drives joints, as the actuators of an MJCF file do: all of them `<general>` ones by now ([`super::general`]), or of kinds that aren't read.
+//! What drives joints, and pushes at sites ([`super::thrusters`]), as the actuators of an MJCF file do: all of them `<general>` ones by now ([`super::general`]), or of kinds that aren't read.
 
 use super::Made;
 use mjcf_rs::Model;
@@ -7,7 +7,7 @@ use mjcf_rs::extras::{Actuator, ActuatorKind};
 use std::collections::HashMap;
 
 /// How a force F follows from the control u, the length l that is driven and its rate.
-enum Law {
+pub(super) enum Law {
     /// F = u, or a multiple of it.
     Force,
     /// F = k (u − l) − c l̇: k and c.
@@ -16,7 +16,7 @@ enum Law {
     Other,
 }
 
-fn law(actuator: &Actuator) -> Law {
+pub(super) fn law(actuator: &Actuator) -> Law {
     let is = |given: &Option<String>, plain: &[&str]| {
         given.as_deref().is_none_or(|given| plain.contains(&given))
     };
@@ -49,6 +49,9 @@ impl Made<'_> {
         let mut drives: HashMap<String, Option<[f64; 2]>> = HashMap::new();
         for actuator in &model.actuators {
             let Some(joint) = actuator.joint.clone() else {
+                if let Some(site) = &actuator.site {
+                    self.thruster(actuator, site);
+                }
                 continue;
             };
             let one = kind_of(model, &joint);

@@ -62,7 +62,13 @@ pub(super) fn flat(file: &Element) -> Result<Element> {
         for joint in ["joint", "jointinparent"] {
             has_joint(one, joint, &joints, "the actuators")?;
         }
-        let mut made = own(&general(&classes, one)?, DRIVE);
+        has_site(one, file)?;
+        let given = general(&classes, one)?;
+        let mut made = own(&given, DRIVE);
+        // Its force would be in the frame of the other site.
+        if given.get("refsite").is_some() {
+            made.attributes.retain(|(name, _)| name != "site");
+        }
         // Of a joint with one coordinate both are the same.
         if let Some(joint) = made.get("jointinparent").map(String::from) {
             made.set("joint", &joint);
@@ -106,6 +112,22 @@ fn has_joint<'e>(
             Err(element.wrong_of(of, what))
         }
     }
+}
+
+/// Refuses actuators of sites that aren't there.
+fn has_site(actuator: &Element, file: &Element) -> Result<()> {
+    let Some(name) = actuator.get("site").filter(|name| !name.is_empty()) else {
+        return Ok(());
+    };
+    let mut open: Vec<&Element> = file.all("worldbody").collect();
+    while let Some(element) = open.pop() {
+        if element.tag == "site" && element.get("name") == Some(name) {
+            return Ok(());
+        }
+        open.extend(&element.children);
+    }
+    let what = format!("site = {name:?}: there is no such site");
+    Err(actuator.wrong_of("the actuators", what))
 }
 
 /// Refuses equalities of joints that aren't there, or have more than one coordinate.

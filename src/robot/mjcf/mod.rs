@@ -15,6 +15,7 @@ mod geometry;
 mod includes;
 mod left_out;
 mod masses;
+mod thrusters;
 mod written;
 
 use super::file::{Extra, File, JointText, LARGEST, guarded};
@@ -26,7 +27,7 @@ use mjcf_rs::body::{Body, Joint, JointType};
 use mjcf_rs::{BodyId, Model, Tristate};
 use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Document;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// A file whose outermost element is `mujoco`.
@@ -55,6 +56,7 @@ pub(super) fn parse(path: &Path, document: &Document) -> Result<File> {
         taken: HashSet::new(),
         names: Vec::new(),
         frames: Vec::new(),
+        sites: HashMap::new(),
     };
     made.names()?;
     made.world();
@@ -79,6 +81,8 @@ struct Made<'m> {
     names: Vec<String>,
     /// Of each body, its link's name and the body's frame in the link's.
     frames: Vec<(String, Isometry3<f64>)>,
+    /// Of each site with a name, its link's.
+    sites: HashMap<String, String>,
 }
 
 fn link(name: &str) -> urdf_rs::Link {
@@ -255,6 +259,9 @@ impl Made<'_> {
             let site_name = self.site_name(site.name.as_deref(), &name, k + 1);
             let pose = own * self.checked(&format!("site {site_name:?}"), &site.pose)?;
             self.file.robot.links.push(link(&site_name));
+            if let Some(own) = &site.name {
+                self.sites.insert(own.clone(), site_name.clone());
+            }
             let joint = format!("{site_name} (fixed)");
             self.join(joint, urdf_rs::JointType::Fixed, [&name, &site_name], &pose);
         }

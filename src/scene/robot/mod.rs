@@ -5,7 +5,7 @@ mod link;
 
 use super::{
     Body, BodyId, CollisionPiece, Drag, Fluid, Mimic, Motion, Passive, Placement, Scene, Servo,
-    Site, is_default,
+    Site, Thruster, is_default,
 };
 use crate::multibody::Joint;
 pub use crate::robot::{
@@ -89,6 +89,8 @@ pub struct Added {
     pub bodies: Vec<BodyId>,
     /// The joints of the file that move, each with the body that it moves.
     pub joints: Vec<(String, BodyId)>,
+    /// Names of its thrusters, forces of the scene: actuators of sites in MJCF files.
+    pub thrusters: Vec<String>,
     /// What it came to.
     pub report: RobotReport,
 }
@@ -245,11 +247,20 @@ impl Scene {
             base,
             bodies,
             folded,
+            thrusters,
             mut report,
         } = options.import(path)?;
         let called = |name: &str| format!("{}{name}", options.prefix);
         self.check_new(path, bodies.iter().map(|b| called(&b.name)))?;
         self.check_new(path, folded.iter().map(|f| called(&f.name)))?;
+        let thrusters: Vec<Thruster> = (thrusters.iter())
+            .map(|t| {
+                let made = Thruster::new(called(&bodies[t.body].name)).named(called(&t.name));
+                let made = made.at(t.at).direction(t.direction);
+                made.polynomial([t.push]).torque(t.torque)
+            })
+            .collect();
+        self.check_new_forces(path, &thrusters)?;
         let (mut joints, mut all) = (Vec::new(), Vec::new());
         for body in &bodies {
             let mut made = options.body(body, base);
@@ -287,6 +298,10 @@ impl Scene {
                 placement: placement(&link.at),
             });
         }
+        let names = thrusters.iter().filter_map(|t| t.name.clone()).collect();
+        for thruster in thrusters {
+            self.add_force(thruster.into());
+        }
         let gravity = nalgebra::Vector3::from(self.gravity).norm();
         let gravity = if gravity > 0.0 {
             gravity
@@ -298,6 +313,7 @@ impl Scene {
         Ok(Added {
             bodies: added,
             joints,
+            thrusters: names,
             report,
         })
     }
@@ -314,6 +330,19 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    fn check_new_forces(&self, path: &Path, thrusters: &[Thruster]) -> Result<()> {
+        let names: Vec<String> = (0..self.forces.len()).map(|i| self.force_name(i)).collect();
+        let taken = |t: &&Thruster| t.name.as_ref().is_some_and(|name| names.contains(name));
+        match thrusters.iter().find(taken) {
+            None => Ok(()),
+            Some(t) => Err(Error::input(
+                format!("{}: actuator", path.display()),
+                format!("{:?}", t.name.as_deref().unwrap_or_default()),
+                "the scene has a force of this name: give the robot a `prefix`",
+            )),
+        }
     }
 
     /// Turns the robots that a file asks for into bodies; `folder` is that of the file.

@@ -279,3 +279,71 @@ fn tendons_that_can_not_be_are_refused() {
         &["arms.a", "coordinate of its own", "\"b\" that arm", "0.3 m"],
     );
 }
+
+/// Two cranks of 0.5 m and a coupler of 0.6 m between their ends, a parallelogram, whose loop a spring closes: the pendulum of one coordinate that it would be with a pin, but for the stretch of the spring.
+#[test]
+fn a_stiff_spring_closes_a_loop() {
+    let hinge = || Joint::Revolute {
+        axis: [0.0, 1.0, 0.0],
+    };
+    let body = |name: &str, mass: f64, inertia: f64, center: [f64; 3]| {
+        let body = Body::dry().named(name).mass(mass).inertia([inertia; 3]);
+        body.center_of_mass(center).joint(hinge())
+    };
+    let start = 0.8;
+    let world = || {
+        let mut scene = Scene::new(Fluid::none());
+        scene.gravity = [0.0, 0.0, -GRAVITY];
+        scene.time_step = 5e-3;
+        scene
+    };
+    let closed = |stiffness: f64| {
+        let mut scene = world();
+        let crank = |name| body(name, 1.0, 0.02, [0.0, 0.0, -0.25]);
+        scene.add(crank("a"));
+        scene.add(crank("b").at([0.6, 0.0, 0.0]));
+        let coupler = body("coupler", 2.0, 0.06, [0.3, 0.0, 0.0]);
+        scene.add(Body {
+            parent: Some("a".into()),
+            ..coupler.at([0.0, 0.0, -0.5])
+        });
+        let pin = Spring::new("coupler")
+            .at([0.6, 0.0, 0.0])
+            .to("b", [0.0, 0.0, -0.5]);
+        scene.add_force(pin.stiffness(stiffness).into());
+        scene.initial.q = vec![start, start, -start];
+        scene
+    };
+    // Of the same inertia and weight about its hinge as the three together.
+    let inertia = 2.0 * (0.02 + 0.25 * 0.25) + 2.0 * 0.5 * 0.5;
+    let center = (2.0 * 0.25 + 2.0 * 0.5) / 4.0;
+    let mut one = world();
+    one.add(body(
+        "one",
+        4.0,
+        inertia - 4.0 * center * center,
+        [0.0, 0.0, -center],
+    ));
+    one.initial.q = vec![start];
+    let run = |scene: &Scene, integrator| {
+        let sim = simulator(scene, integrator);
+        sim.rollout(&Controls::zeros(&sim, 400)).unwrap()
+    };
+    let right = run(&one, Integrator::Rk4);
+    for stiffness in [1e4, 1e6] {
+        let rollout = run(&closed(stiffness), Integrator::Midpoint);
+        assert!(rollout.warnings().is_empty(), "{:?}", rollout.warnings());
+        let (mut off, mut gap) = (0.0_f64, 0.0_f64);
+        for (s, right) in rollout.samples().iter().zip(right.samples()) {
+            off = off.max((s.q[0] - right.q[0]).abs());
+            let [coupler, b] = [(2, [0.6, 0.0, 0.0]), (1, [0.0, 0.0, -0.5])]
+                .map(|(body, point): (usize, [f64; 3])| s.poses[body].apply(&point.into()));
+            gap = gap.max((coupler - b).norm());
+        }
+        println!("{stiffness:.0e} N/m: {off:.1e} rad off, {gap:.1e} m open");
+        assert!(off < 80.0 / stiffness && gap < 30.0 / stiffness);
+    }
+    let mut held = closed(1e4);
+    held.time_step = 1e-3;
+    gradients(&held, Integrator::Midpoint);
+}

@@ -73,6 +73,15 @@ impl Declarations {
         self.declare_named(owner, declared, declared.name, value)
     }
 
+    /// The parameter of this name that its owner has declared already, or else it is added with this value.
+    pub fn declare_once(&mut self, owner: Owner, declared: Declared, value: f64) -> Parameter {
+        let same = |entry: &Entry| entry.owner == owner && entry.declared.name == declared.name;
+        match self.made.iter().position(|(entry, _)| same(entry)) {
+            Some(i) => Parameter(i),
+            None => self.declare(owner, declared, value),
+        }
+    }
+
     /// Adds one of several parameters that are declared alike: its name ends in a dot and `part`.
     pub fn declare_part(
         &mut self,

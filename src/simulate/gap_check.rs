@@ -6,6 +6,7 @@ use crate::adjoint::lie::{Pose, Vec3, Vec6};
 use crate::geometry::{Gap, Other};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use std::cmp::Ordering;
 
 /// Step of the differences that give a gap's direction, of the length of the edges there.
 const STEP: f64 = 1e-5;
@@ -17,7 +18,7 @@ pub struct GapCheck {
     pub time: f64,
     /// The smallest gap, m.
     pub gap: f64,
-    /// Names of the bodies; of the second none for a wall. The first is the smaller one.
+    /// Names of the bodies; of the second none for a wall. The first is the smaller one, or the one that moves.
     pub bodies: (String, Option<String>),
     /// Added mass M of the first body, all others at rest, along the direction in which the gap opens: by the run, and by panels, kg.
     pub added_mass: [f64; 2],
@@ -99,10 +100,13 @@ impl<'a> Across<'a> {
     /// None where no motion changes the gap.
     fn new(simulator: &Simulator, poses: &'a [Pose], gap: &Gap) -> Option<Self> {
         let system = simulator.system();
-        let volume = |b: usize| system.bodies[b].volume;
+        let carriers = simulator.scene.carriers();
+        // What moves before what stands, and the smaller one of two that do.
+        let order = |b: usize| (carriers.is_static(b), system.bodies[b].volume);
+        let first = |a: usize, b: usize| order(a).partial_cmp(&order(b)) != Some(Ordering::Greater);
         let seen = |body: usize| system.submerged().any(|(b, _)| b == body);
         let (smaller, other) = match gap.second {
-            Other::Body(b) if volume(b) < volume(gap.first) => (b, Some(gap.first)),
+            Other::Body(b) if !first(gap.first, b) => (b, Some(gap.first)),
             Other::Body(b) => (gap.first, Some(b)),
             Other::Wall(_) => (gap.first, None),
         };

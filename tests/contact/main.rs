@@ -1,6 +1,7 @@
 //! Contact of bodies with one another and with walls, and joints at their limits.
 
 mod drops;
+mod flat;
 mod flush;
 mod geometry;
 mod heaps;

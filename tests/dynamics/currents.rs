@@ -3,7 +3,8 @@
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{
-    Body, Current, Drag, DragPart, Fin, Fluid, Joint, Motion, Scene, Shape, Thruster,
+    Body, Current, Drag, DragPart, Fin, Float, Fluid, Joint, Motion, Passive, Scene, Shape,
+    Thruster,
 };
 use hydrograd::simulate::gradcheck::{self, gradcheck};
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
@@ -135,6 +136,64 @@ fn a_neutrally_buoyant_body_goes_with_accelerating_water() {
     }
 }
 
+/// So does one that floats make neutral, and one that is but a volume: a stream that accelerates by a is gravity that is smaller by a, to whoever goes along.
+#[test]
+fn floats_and_volumes_go_with_accelerating_water() {
+    let acceleration = Vector3::new(0.7, -0.4, 0.3);
+    let ramp = Motion::Linear {
+        offset: 0.0,
+        rate: 1.0,
+    };
+    let steps = 100;
+    let scene = |moving: bool| {
+        let mut scene = Scene::new(water([0.1, 0.0, 0.0]));
+        scene.time_step = 5e-3;
+        let gravity = Vector3::new(0.0, 0.0, -9.81);
+        scene.gravity = match moving {
+            true => gravity,
+            false => gravity - acceleration,
+        }
+        .into();
+        let hull = Body::new(Shape::cuboid([0.4, 0.3, 0.2]).faces(108)).named("hull");
+        scene.add(hull.mass(26.0).center_of_mass([0.01, 0.0, -0.02]));
+        let pod = Body::dry().named("pod").mass(1.0).inertia([0.01; 3]);
+        let pod = pod.volume(0.002).joint(Joint::Prismatic {
+            axis: [1.0, 0.0, 0.0],
+        });
+        let pod = pod.passive(Passive::default().stiffness(30.0));
+        scene.add(pod.child_of("hull").at([0.0, 0.1, 0.3]));
+        let foam = Float::new("hull").at([0.0, 0.05, 0.1]).volume(0.002);
+        scene.add_force(foam.mass(0.3).into());
+        if moving {
+            let current = Current::new(acceleration.into());
+            scene.add_force(current.over_time(ramp.clone()).into());
+        }
+        scene.initial.v = vec![0.4, 0.2, -0.3, 1.0, 2.0, -1.0, 0.1];
+        scene
+    };
+    for integrator in [Integrator::Rk4, Integrator::Midpoint] {
+        let run = |moving| {
+            let sim = simulator(&scene(moving), Fidelity::Isolated, integrator);
+            sim.rollout(&Controls::zeros(&sim, steps)).unwrap()
+        };
+        let (moving, still) = (run(true), run(false));
+        let pairs = moving.samples().iter().zip(still.samples());
+        let off = pairs.map(|(a, b)| {
+            let carried = 0.5 * a.time * a.time * acceleration;
+            let each = a.poses.iter().zip(&b.poses);
+            let each = each.map(|(a, b)| (a.translation - b.translation - carried).norm());
+            each.fold(0.0, f64::max)
+        });
+        let off = off.fold(0.0, f64::max);
+        println!("{integrator:?}: {off:.1e} m");
+        let limit = match integrator {
+            Integrator::Rk4 => 1e-8,
+            _ => 1e-5,
+        };
+        assert!(off < limit, "{integrator:?}: {off:.1e}");
+    }
+}
+
 /// A sphere of another density is accelerated 3/(2s + 1) times as much as the water, s its density over the water's (Lamb, art. 92).
 #[test]
 fn a_sphere_lags_or_leads_as_lamb_has_it() {
@@ -250,6 +309,8 @@ fn gradients_are_the_differences() {
         .profile(profile);
     scene.add_force(deep.over_time(tide()).into());
     scene.add_force(Current::new([0.0, 0.0, 0.0]).named("unknown").into());
+    let foam = Float::new("arm").named("foam").at([0.02, 0.01, 0.03]);
+    scene.add_force(foam.volume(1e-4).mass(0.02).into());
     assert_eq!(
         Scene::from_toml(&scene.to_toml().unwrap(), "").unwrap(),
         scene
@@ -267,7 +328,12 @@ fn gradients_are_the_differences() {
                 .names()
                 .map(String::from)
                 .collect::<Vec<_>>();
-            for name in ["wind.velocity.y", "wind.share.2", "unknown.velocity.x"] {
+            for name in [
+                "wind.velocity.y",
+                "wind.share.2",
+                "unknown.velocity.x",
+                "foam.volume",
+            ] {
                 assert!(names.iter().any(|n| n == name), "{name} isn't in {names:?}");
             }
             let settings = gradcheck::GradcheckSettings {

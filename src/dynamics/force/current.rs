@@ -2,16 +2,18 @@
 //!
 //! The body's own added mass alone has part in it ([`crate::adjoint::stream`]): in bodies that feel each other, and at walls, the water's answer to the stream is that of each alone.
 
+use super::displaced::{Displaced, of_bodies, of_floats};
 use super::stream::{Streams, Undisturbed};
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Together, Velocity};
 use crate::adjoint::lie::{Mat6, Pose, Vec3, Vec6, angular, cross_force, linear, six};
 use crate::adjoint::stream::{Stream, stream_wrench, stream_wrench_jvp, stream_wrench_vjp};
 use crate::dynamics::Parameters;
-use crate::dynamics::parameters::{DENSITY, Declarations, Parameter, center_of_buoyancy, volume};
+use crate::dynamics::parameters::{DENSITY, Declarations};
 use std::sync::Arc;
 
 struct Carried {
     bodies: Vec<Body>,
+    displaced: Vec<Displaced>,
     streams: Arc<Streams>,
 }
 
@@ -19,8 +21,6 @@ struct Body {
     body: usize,
     /// Its own added mass at unit density, body's frame, about its origin.
     added: Mat6,
-    volume: Parameter,
-    center: [Parameter; 3],
 }
 
 /// A body in the stream, its own frame.
@@ -34,20 +34,25 @@ struct Streamed<'m> {
     stream: Stream,
 }
 
-pub(super) fn assemble(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
-    let body = |(body, added): &(usize, Mat6)| Body {
+pub(super) fn assemble(
+    parts: &ForceParts,
+    parameters: &mut Declarations,
+) -> Option<Box<dyn ForceModel>> {
+    if parts.streams.is_empty() || parts.scene.fluid.density <= 0.0 {
+        return None;
+    }
+    let own = parts.added_mass.iter();
+    let bodies = own.map(|(body, added)| Body {
         body: *body,
         added: *added,
-        volume: volume(*body),
-        center: center_of_buoyancy(*body),
-    };
-    let bodies: Vec<Body> = parts.added_mass.iter().map(body).collect();
-    (!bodies.is_empty()).then(|| {
-        Box::new(Carried {
-            bodies,
-            streams: parts.streams.clone(),
-        }) as Box<dyn ForceModel>
-    })
+    });
+    let mut displaced = of_bodies(parts);
+    displaced.extend(of_floats(parts, parameters));
+    Some(Box::new(Carried {
+        bodies: bodies.collect(),
+        displaced,
+        streams: parts.streams.clone(),
+    }))
 }
 
 impl Carried {
@@ -67,20 +72,37 @@ impl Carried {
             },
         }
     }
+
+    /// Adds what belongs to the water at a body and to its pose, of cotangents in the body's frame; `wrench` is what acts there, world.
+    fn add_stream_bar(
+        &self,
+        b: usize,
+        (at, s): (&Moving, &Streamed),
+        (virt, wrench): (&Vec6, &Vec6),
+        own: &Stream,
+        bar: &mut LoadBars,
+    ) {
+        let world = |x: &Vec3| s.pose.rotation * x;
+        let water_bar = Undisturbed {
+            velocity: world(&own.velocity),
+            acceleration: world(&own.acceleration),
+        };
+        // The rotation of the frame acts on the virtual twist, and on what is known of the water.
+        bar.pose[b] -= cross_force(virt, wrench);
+        let turned = water_bar.velocity.cross(&s.water.velocity)
+            + water_bar.acceleration.cross(&s.water.acceleration);
+        bar.pose[b] += six(&Vec3::zeros(), &turned);
+        self.streams.at_body_vjp(b, &at.place, &water_bar, bar);
+    }
 }
 
-impl Body {
-    /// The wrench of a pressure that accelerates the water, per mass of what is displaced.
-    fn pressed(&self, stream: &Stream, parameters: &Parameters) -> Vec6 {
-        let center = parameters.point(self.center);
-        six(&stream.acceleration, &center.cross(&stream.acceleration))
-    }
+/// The wrench of a pressure that accelerates the water, per mass of what is displaced at a point, body's frame.
+fn pressed(center: &Vec3, stream: &Stream) -> Vec6 {
+    six(&stream.acceleration, &center.cross(&stream.acceleration))
+}
 
-    /// The wrench at unit density, body's frame.
-    fn unit(&self, at: &Streamed, parameters: &Parameters) -> Vec6 {
-        stream_wrench(&self.added, &at.nu, &at.stream)
-            + parameters[self.volume] * self.pressed(&at.stream, parameters)
-    }
+fn mass(displaced: &Displaced, parameters: &Parameters) -> f64 {
+    parameters.density() * parameters[displaced.volume]
 }
 
 impl ForceModel for Carried {
@@ -92,8 +114,14 @@ impl ForceModel for Carried {
         let parameters = at.place.parameters;
         for body in &self.bodies {
             let s = self.streamed(body.body, at);
-            let wrench = parameters.density() * body.unit(&s, parameters);
+            let wrench = parameters.density() * stream_wrench(&body.added, &s.nu, &s.stream);
             out.wrenches[body.body] += s.pose.wrench_to_world(&wrench);
+        }
+        for displaced in &self.displaced {
+            let s = self.streamed(displaced.body, at);
+            let center = displaced.point.at(parameters);
+            let wrench = mass(displaced, parameters) * pressed(&center, &s.stream);
+            out.wrenches[displaced.body] += s.pose.wrench_to_world(&wrench);
         }
     }
 
@@ -122,31 +150,36 @@ impl ForceModel for Carried {
             }
             let s = self.streamed(b, at);
             let zeta = s.pose.twist_to_body(virt);
-            let unit = body.unit(&s, parameters);
-            let displaced = density * parameters[body.volume];
-            let along = zeta.dot(&body.pressed(&s.stream, parameters));
+            let unit = stream_wrench(&body.added, &s.nu, &s.stream);
             bar.parameters[DENSITY] += zeta.dot(&unit);
-            bar.parameters[body.volume] += density * along;
-            let center_bar = displaced * s.stream.acceleration.cross(&angular(&zeta));
-            bar.parameters.add_point(body.center, &center_bar);
-
             let made = stream_wrench_vjp(&body.added, &s.nu, &s.stream, &(density * zeta));
-            let center = parameters.point(body.center);
-            let pushed = displaced * (linear(&zeta) + angular(&zeta).cross(&center));
-            let world = |x: &Vec3| s.pose.rotation * x;
-            let water_bar = Undisturbed {
-                velocity: world(&made.stream.velocity),
-                acceleration: world(&(made.stream.acceleration + pushed)),
-            };
             let nu_bar = s.pose.wrench_to_world(&made.nu);
-            let wrench = s.pose.wrench_to_world(&(density * unit));
             bar.twist[b] += nu_bar;
-            // The rotation of the frame acts on both twists, and on what is known of the water.
-            bar.pose[b] -= cross_force(&s.past, &nu_bar) + cross_force(virt, &wrench);
-            let turned = water_bar.velocity.cross(&s.water.velocity)
-                + water_bar.acceleration.cross(&s.water.acceleration);
-            bar.pose[b] += six(&Vec3::zeros(), &turned);
-            self.streams.at_body_vjp(b, &at.place, &water_bar, bar);
+            bar.pose[b] -= cross_force(&s.past, &nu_bar);
+            let wrench = s.pose.wrench_to_world(&(density * unit));
+            self.add_stream_bar(b, (at, &s), (virt, &wrench), &made.stream, bar);
+        }
+        for displaced in &self.displaced {
+            let b = displaced.body;
+            let virt = &z.twists[b];
+            if *virt == Vec6::zeros() {
+                continue;
+            }
+            let s = self.streamed(b, at);
+            let zeta = s.pose.twist_to_body(virt);
+            let (mass, center) = (mass(displaced, parameters), displaced.point.at(parameters));
+            let unit = pressed(&center, &s.stream);
+            let along = zeta.dot(&unit);
+            bar.parameters[DENSITY] += parameters[displaced.volume] * along;
+            bar.parameters[displaced.volume] += density * along;
+            let center_bar = mass * s.stream.acceleration.cross(&angular(&zeta));
+            displaced.point.add(&center_bar, bar.parameters);
+            let stream_bar = Stream {
+                velocity: Vec3::zeros(),
+                acceleration: mass * (linear(&zeta) + angular(&zeta).cross(&center)),
+            };
+            let wrench = s.pose.wrench_to_world(&(mass * unit));
+            self.add_stream_bar(b, (at, &s), (virt, &wrench), &stream_bar, bar);
         }
     }
 
@@ -155,7 +188,9 @@ impl ForceModel for Carried {
     }
 
     fn outside(&self, group: &Together, parameters: &Parameters) -> Outside {
-        let held = self.bodies.iter().any(|body| group.holds(body.body));
+        let mut each = (self.bodies.iter().map(|body| body.body))
+            .chain(self.displaced.iter().map(|displaced| displaced.body));
+        let held = each.any(|b| group.holds(b));
         match held && !self.streams.rest(parameters) {
             true => Outside::All,
             false => Outside::Nothing,

@@ -8,6 +8,7 @@ mod actuation;
 mod current;
 mod curve;
 mod damping;
+mod displaced;
 mod drag;
 mod edge;
 mod fin;

@@ -1,17 +1,11 @@
 //! Forces at points of bodies by gravity: weight, m g at the centre of mass, and buoyancy, −ρ V g at the centre of buoyancy, of bodies and of floats.
 
+use super::displaced::{Displaced, Point, of_bodies, of_floats};
 use super::{ForceModel, ForceParts, LoadBars, Loads, Moving, Outside, Place, Together, Velocity};
 use crate::adjoint::lie::{Vec3, angular, point_velocity, point_wrench};
 use crate::dynamics::parameters::{
-    DENSITY, Declarations, Declared, Owner, Parameter, Parameters, Range, center_of_buoyancy,
-    center_of_mass, mass, volume,
+    DENSITY, Declarations, Parameter, Parameters, center_of_mass, mass,
 };
-use crate::scene::{BUOYANT_ANYWHERE, Force};
-
-/// Of a float.
-const VOLUME: Declared = Declared::new("volume", "m³");
-/// Under a surface, where a scene refuses it too.
-const NO_VOLUME: Declared = VOLUME.range(Range::Zero(BUOYANT_ANYWHERE));
 
 struct Weight {
     name: &'static str,
@@ -30,10 +24,15 @@ struct Parcel {
     volume: Option<Parameter>,
 }
 
-/// In a body's frame, m.
-enum Point {
-    Free([Parameter; 3]),
-    Fixed(Vec3),
+impl From<Displaced> for Parcel {
+    fn from(displaced: Displaced) -> Self {
+        Self {
+            body: displaced.body,
+            point: displaced.point,
+            of: DENSITY,
+            volume: Some(displaced.volume),
+        }
+    }
 }
 
 pub(super) fn gravity(parts: &ForceParts, _: &mut Declarations) -> Option<Box<dyn ForceModel>> {
@@ -53,14 +52,7 @@ pub(super) fn buoyancy(parts: &ForceParts, _: &mut Declarations) -> Option<Box<d
     if parts.waterline.is_some() {
         return None;
     }
-    let bodies = parts.bodies.iter().zip(&parts.scene.bodies).enumerate();
-    let displacing = bodies.filter(|(_, (b, given))| b.volume > 0.0 || given.volume.is_some());
-    let parcels = displacing.map(|(body, _)| Parcel {
-        body,
-        point: Point::Free(center_of_buoyancy(body)),
-        of: DENSITY,
-        volume: Some(volume(body)),
-    });
+    let parcels = of_bodies(parts).into_iter().map(Parcel::from);
     let acceleration = -Vec3::from(parts.scene.gravity);
     let acts = acceleration != Vec3::zeros();
     acts.then(|| assemble("buoyancy", acceleration, parcels.collect()))?
@@ -71,24 +63,9 @@ pub(super) fn floats(
     parts: &ForceParts,
     parameters: &mut Declarations,
 ) -> Option<Box<dyn ForceModel>> {
-    let scene = parts.scene;
-    let volume = match parts.waterline {
-        Some(_) => NO_VOLUME,
-        None => VOLUME,
-    };
-    let mut parcels = Vec::new();
-    for (i, force) in scene.forces.iter().enumerate() {
-        let Force::Float(given) = force else { continue };
-        let owner = Owner::Named(scene.force_name(i));
-        parcels.push(Parcel {
-            body: scene.body(&given.body).map_or(0, |b| b.0),
-            point: Point::Fixed(given.at.into()),
-            of: DENSITY,
-            volume: Some(parameters.declare(owner, volume, given.volume)),
-        });
-    }
+    let parcels = of_floats(parts, parameters).into_iter().map(Parcel::from);
     // Without gravity, too: their volumes are parameters, and tell where the centre of buoyancy is.
-    assemble("float", -Vec3::from(scene.gravity), parcels)
+    assemble("float", -Vec3::from(parts.scene.gravity), parcels.collect())
 }
 
 fn assemble(
@@ -106,13 +83,6 @@ fn assemble(
 }
 
 impl Parcel {
-    fn point(&self, parameters: &Parameters) -> Vec3 {
-        match &self.point {
-            Point::Free(at) => parameters.point(*at),
-            Point::Fixed(at) => *at,
-        }
-    }
-
     /// What of it the acceleration acts on, kg.
     fn mass(&self, parameters: &Parameters) -> f64 {
         parameters[self.of] * self.volume.map_or(1.0, |v| parameters[v])
@@ -123,7 +93,10 @@ impl Weight {
     /// Where a parcel is, and the force on it.
     fn at(&self, p: &Parcel, place: &Place) -> (Vec3, Vec3) {
         let force = p.mass(place.parameters) * self.acceleration;
-        (place.poses[p.body].apply(&p.point(place.parameters)), force)
+        (
+            place.poses[p.body].apply(&p.point.at(place.parameters)),
+            force,
+        )
     }
 }
 
@@ -153,10 +126,8 @@ impl ForceModel for Weight {
                     bar.parameters[volume] += at.place.parameters[p.of] * along;
                 }
             }
-            if let Point::Free(point) = p.point {
-                let turned = at.place.poses[p.body].rotation.tr_mul(&x_bar);
-                bar.parameters.add_point(point, &turned);
-            }
+            let turned = at.place.poses[p.body].rotation.tr_mul(&x_bar);
+            p.point.add(&turned, bar.parameters);
         }
     }
 

@@ -8,7 +8,7 @@
 //! a piece's length.
 
 use super::Stepper;
-use super::plan::{MOST, Plan, Stops};
+use super::plan::{Plan, SEEN, Stops};
 use crate::Result;
 use crate::adjoint::lie::{Pose, Vec6, point_velocity};
 use crate::contact::ContactPair;
@@ -151,7 +151,7 @@ fn met_within(model: &ContactModel, poses: &[Pose], twists: &[Vec6], dt: f64) ->
 /// A number of pieces in which each does `share` at most of what a step does.
 fn pieces(share: f64) -> usize {
     // One of what isn't a number: that is said elsewhere.
-    share.ceil().max(1.0).min(MOST as f64) as usize
+    share.ceil().max(1.0).min(SEEN as f64) as usize
 }
 
 impl Stepper<'_> {

@@ -29,6 +29,8 @@ use nalgebra::{DMatrix, DVector};
 /// Relative change of the velocity at which the fixed point in q_m ends.
 const TOLERANCE: f64 = 1e-14;
 const ITERATIONS: usize = 60;
+/// How many times as large as noise what stays after them may be.
+const STALLED: f64 = 10.0;
 /// What is left of the adjoint's equation, of what it sums; and the coarsest that a part of the sum is solved to.
 const ADJOINT: f64 = 1e-13;
 const ENOUGH: f64 = 1e-6;
@@ -73,13 +75,14 @@ pub(super) fn step(start: &Start) -> std::result::Result<(State, Stages), Halt> 
         return ends(start, found.v, y);
     }
     let mut previous = f64::INFINITY;
-    for _ in 0..ITERATIONS {
+    for iteration in 1..=ITERATIONS {
         let m = middle(start, &stage)?;
         let next = solve_stage(start, &m, &p, rule(s), &stage)?;
         let moved = change(&m, &next.v, &stage);
         stage = next.v;
         // Down at rounding, or at the coupled solve's own tolerance, changes are noise: stop when they no longer halve.
-        if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) {
+        let at_last = iteration == ITERATIONS && moved <= STALLED * noise(&m);
+        if moved <= TOLERANCE || (moved <= noise(&m) && moved > 0.5 * previous) || at_last {
             let y = &p + s.dt * next.force;
             return ends(start, stage, y);
         }

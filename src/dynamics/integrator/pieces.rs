@@ -1,7 +1,7 @@
 //! A step, as it is or cut into equal pieces: each a step of its own with the same control and the same joints held.
 //!
 //! It is cut where contact or limits foresee that it passes something ([`Stepper::foreseen`]), where the inertia changes too much in its
-//! implicit stage, where it fails, and where it turns out to have passed something; then into twice as many pieces, to [`MOST`](super::plan::MOST) at most.
+//! implicit stage, where it fails, and where it turns out to have passed something; then into twice as many pieces, to [`SEEN`](super::plan::SEEN) or [`MOST`](super::plan::MOST) at most.
 
 use super::plan::{Halt, Plan, Stops};
 use super::record::{LaterPiece, StepRecord};
@@ -44,9 +44,11 @@ impl<'a> Stepper<'a> {
             false => Plan::whole(),
         };
         loop {
-            let may_cut = self.integrator.solves_contact() && plan.may_cut();
+            let solves_contact = self.integrator.solves_contact();
+            let may_cut = solves_contact && plan.may_cut();
+            let may_look_closer = solves_contact && plan.may_look_closer();
             match self.planned(e, state, v, input, &plan) {
-                Ok((next, record)) if record.passed.is_empty() || !may_cut => {
+                Ok((next, record)) if record.passed.is_empty() || !may_look_closer => {
                     return Ok((next, record));
                 }
                 Ok((_, record)) => {
@@ -92,7 +94,7 @@ impl<'a> Stepper<'a> {
         } = stepper.piece(e, &first, v, input, plan)?;
         let mut later = Vec::with_capacity(n - 1);
         // What was passed is made again in more pieces, if there may be more.
-        while later.len() + 1 < n && (passed.is_empty() || !plan.may_cut()) {
+        while later.len() + 1 < n && (passed.is_empty() || !plan.may_look_closer()) {
             let e = stepper.linearise(&next.q, stepper.time(&next))?;
             let v = stepper.velocity(&e, &next)?;
             let piece = stepper.piece(&e, &next, &v, input, plan)?;

@@ -1,6 +1,6 @@
 //! What a rollout's smallest gap is worth, against coupled panels.
 
-use hydrograd::scene::{Body, Fluid, Scene};
+use hydrograd::scene::{Body, Fluid, Joint, Scene};
 use hydrograd::simulate::{GapCheck, Method};
 use hydrograd::{Controls, Fidelity, Settings, Shape, Simulator};
 
@@ -149,4 +149,24 @@ fn a_fixed_neighbour_is_not_taken_for_what_moves() {
     scene.bodies[0].inertia = Some(vec![0.1; 3]);
     scene.add_wall([0.0, 0.0, -0.06], [0.0, 0.0, 1.0]);
     assert!(checked(&scene, &Settings::default().fidelity(Fidelity::Isolated)).is_none());
+}
+
+/// Of a thin plate that is fixed and a ball that isn't the ball's added mass counts, though the plate is smaller.
+#[test]
+fn the_body_that_moves_is_checked() {
+    let mut scene = Scene::new(Fluid {
+        density: 1000.0,
+        current: [0.0; 3],
+    });
+    scene.time_step = 0.01;
+    let plate = Body::new(Shape::cuboid([0.01, 0.3, 0.3]).faces(300)).named("plate");
+    scene.add(plate.density(7000.0).joint(Joint::Fixed));
+    let ball = Body::new(Shape::sphere(0.065).faces(320)).named("ball");
+    scene.add(ball.density(1000.0).at([0.09, 0.0, 0.0]));
+    let settings = Settings::default().fidelity(Fidelity::Reduced);
+    let check = checked(&scene, &settings).unwrap();
+    println!("{check:?}");
+    assert_eq!(check.bodies, ("ball".into(), Some("plate".into())));
+    let own = 0.5 * 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.065_f64.powi(3);
+    assert!(check.added_mass.iter().all(|m| *m > own && *m < 2.0 * own));
 }

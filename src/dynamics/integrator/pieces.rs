@@ -44,27 +44,31 @@ impl<'a> Stepper<'a> {
             false => Plan::whole(),
         };
         loop {
-            let solves_contact = self.integrator.solves_contact();
-            let may_cut = solves_contact && plan.may_cut();
-            let may_look_closer = solves_contact && plan.may_look_closer();
+            let may_cut = self.integrator.solves_contact() && plan.may_cut();
             match self.planned(e, state, v, input, &plan) {
-                Ok((next, record)) if record.passed.is_empty() || !may_look_closer => {
+                Ok((next, record)) if !self.is_curable(&plan, &record.passed) => {
                     return Ok((next, record));
                 }
-                Ok((_, record)) => {
-                    let mut passed = record.passed;
-                    // A stiffness that was given stays what it is.
-                    if self.system.contact.as_ref().is_some_and(|m| !m.rigid) {
-                        passed.pairs.clear();
-                    }
-                    plan.sharp.add(&passed);
-                    plan.cut(2);
-                }
+                Ok((_, record)) => plan.cure(&self.rigid(&record.passed)),
                 Err(Halt::TooLong(times)) => plan.cut(times),
-                Err(Halt::Failed(error)) if may_cut && is_curable(&error) => plan.cut(2),
+                Err(Halt::Failed(error)) if may_cut && may_end(&error) => plan.cut(2),
                 Err(Halt::Failed(error)) => return Err(error),
             }
         }
+    }
+
+    /// What of it presses more stiffly in more pieces: a stiffness that was given stays what it is.
+    fn rigid(&self, passed: &Stops) -> Stops {
+        let mut out = passed.clone();
+        if self.system.contact.as_ref().is_some_and(|m| !m.rigid) {
+            out.pairs.clear();
+        }
+        out
+    }
+
+    /// Whether what was passed asks for another plan.
+    fn is_curable(&self, plan: &Plan, passed: &Stops) -> bool {
+        self.integrator.solves_contact() && plan.cures(passed, &self.rigid(passed))
     }
 
     /// A step in the pieces that `plan` asks for.
@@ -94,7 +98,7 @@ impl<'a> Stepper<'a> {
         } = stepper.piece(e, &first, v, input, plan)?;
         let mut later = Vec::with_capacity(n - 1);
         // What was passed is made again in more pieces, if there may be more.
-        while later.len() + 1 < n && (passed.is_empty() || !plan.may_look_closer()) {
+        while later.len() + 1 < n && !self.is_curable(plan, &passed) {
             let e = stepper.linearise(&next.q, stepper.time(&next))?;
             let v = stepper.velocity(&e, &next)?;
             let piece = stepper.piece(&e, &next, &v, input, plan)?;
@@ -210,7 +214,7 @@ impl<'a> Stepper<'a> {
 }
 
 /// Whether a shorter step may do better: solves, and states that have run away.
-fn is_curable(error: &Error) -> bool {
+fn may_end(error: &Error) -> bool {
     matches!(
         error,
         Error::Solver { .. } | Error::Unresolved { .. } | Error::Input { .. }

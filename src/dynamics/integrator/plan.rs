@@ -60,9 +60,21 @@ impl Plan {
         self.pieces < MOST
     }
 
-    /// Whether more pieces may be asked for because something was passed.
-    pub fn may_look_closer(&self) -> bool {
-        self.pieces < SEEN
+    /// Whether what was passed asks for another plan: for more pieces, or because `rigid`, what of it may press more stiffly, doesn't yet.
+    pub fn cures(&self, passed: &Stops, rigid: &Stops) -> bool {
+        let pairs = &self.sharp.pairs;
+        let limits = &self.sharp.limits;
+        let stays = (rigid.pairs.iter()).all(|pair| pairs.binary_search(pair).is_ok())
+            && (rigid.limits.iter()).all(|limit| limits.binary_search(limit).is_ok());
+        !passed.is_empty() && (self.pieces < SEEN || !stays)
+    }
+
+    /// The plan that what was passed asks for.
+    pub fn cure(&mut self, rigid: &Stops) {
+        self.sharp.add(rigid);
+        if self.pieces < SEEN {
+            self.cut(2);
+        }
     }
 
     /// Asks for `times` as many pieces.

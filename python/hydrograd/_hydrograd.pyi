@@ -290,6 +290,9 @@ class Robot:
     def joints(self) -> dict[str, int]:
         """Numbers of the bodies that its joints move, by the joints' names; those that follow others have no coordinate and aren't listed."""
     @property
+    def thrusters(self) -> list[str]:
+        """Names of its thrusters, forces of the scene: actuators of sites in MJCF files."""
+    @property
     def report(self) -> dict[str, Any]:
         """What it came to, as `inspect_robot` gives it."""
 

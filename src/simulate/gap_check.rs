@@ -105,15 +105,15 @@ impl<'a> Across<'a> {
         let order = |b: usize| (carriers.is_static(b), system.bodies[b].volume);
         let first = |a: usize, b: usize| order(a).partial_cmp(&order(b)) != Some(Ordering::Greater);
         let seen = |body: usize| system.submerged().any(|(b, _)| b == body);
-        let (smaller, other) = match gap.second {
+        let (mover, other) = match gap.second {
             Other::Body(b) if !first(gap.first, b) => (b, Some(gap.first)),
             Other::Body(b) => (gap.first, Some(b)),
             Other::Wall(_) => (gap.first, None),
         };
         // What nothing moves isn't in the water where bodies don't feel each other.
         let (body, other) = match other {
-            _ if seen(smaller) => (smaller, other),
-            Some(b) if seen(b) => (b, Some(smaller)),
+            _ if seen(mover) => (mover, other),
+            Some(b) if seen(b) => (b, Some(mover)),
             _ => return None,
         };
         let step = STEP * gap.edge;

@@ -48,7 +48,7 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
 
     `q` (time, coordinate) and `v` (time, velocity) by their names; of each body `positions`, `velocities` (of its origin, then angular; world axes),
     `angular_momentum` and `contact_forces` (time, body, axis), and `rotations` (time, body, row, column); `kinetic_energy`, `potential_energy`, `min_gap` (time);
-    `controls` (step, control), and `applied_controls`, which hold the controller's as well.
+    `controls` (step, control) by their names, and `applied_controls`, which hold the controller's as well.
     """
     xarray = _needs("xarray", "to_xarray")
     sim = rollout.simulator
@@ -67,6 +67,7 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
         "coordinate": sim.q_names,
         "velocity": sim.v_names,
         "body": sim.body_names,
+        "control": sim.control_names,
     }
     for name, (labels, unit) in OF_BODIES.items():
         axis = "axis" if len(labels) == 3 else "component"
@@ -90,7 +91,7 @@ def plot(rollout: Rollout, what: Sequence[str] = ("q", "v", "energy", "contact_f
     lines: dict[str, tuple[str, list[tuple[str, Any, Any]]]] = {
         "q": ("coordinates, m, rad", [(name, time, x) for name, x in zip(sim.q_names, rollout.q.T)]),
         "v": ("velocities, m/s, rad/s", [(name, time, x) for name, x in zip(sim.v_names, rollout.v.T)]),
-        "controls": ("controls, N, N m", [(f"{i}", time[:-1], u) for i, u in enumerate(rollout.applied_controls.T)]),
+        "controls": ("controls, N, N m", [(name, time[:-1], u) for name, u in zip(sim.control_names, rollout.applied_controls.T)]),
         "energy": (
             "energy, J",
             [

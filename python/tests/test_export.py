@@ -34,6 +34,7 @@ def test_xarray(rollout):
     forces = rollout.observe("contact_forces")
     assert np.nanmax(np.abs(forces)) > 0.0  # the pebble lies on the floor
     assert np.array_equal(data.contact_forces, forces, equal_nan=True)
+    assert list(data.control.values) == rollout.simulator.control_names
     assert data.controls.shape == (60, 3) and data.positions.attrs["units"] == "m"
     assert data.rotations.shape == (61, 4, 3, 3) and data.attrs["fidelity"] == "isolated"
 

@@ -214,6 +214,10 @@ fn actuators_of_sites_are_thrusters() {
         added.report.to_string(),
         &["site \"tip\" is the thruster \"tip thruster\", 10 N a unit"],
     );
+    let mut wrong = scene.clone();
+    wrong.add_force(Thruster::new("port").into());
+    let error = wrong.validate().unwrap_err().to_string();
+    says(error, &["\"port\"", "it is a site", "\"hull\"", "[-0.2, 0.1, 0.05]"]);
     scene.gravity = [0.0; 3];
     let sim = Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap();
     let hull = scene.body("hull").unwrap().0;

@@ -161,7 +161,13 @@ impl Scene {
     pub(super) fn named_body(&self, name: &str, place: String) -> Result<BodyId> {
         self.body(name).ok_or_else(|| {
             let names: Vec<&str> = self.bodies.iter().map(|b| b.name.as_str()).collect();
-            let remedy = format!("no body has that name; the bodies are {}", names.join(", "));
+            let remedy = match self.sites.iter().find(|site| site.name == name) {
+                Some(site) => format!(
+                    "it is a site: name its body, {:?}, and give places and directions in that one's frame (the site is at {:?} m there, turned by {:?} rad)",
+                    site.body, site.placement.position, site.placement.rotation
+                ),
+                None => format!("no body has that name; the bodies are {}", names.join(", ")),
+            };
             Error::input(place, format!("{name:?}"), remedy)
         })
     }

@@ -192,9 +192,8 @@ fn vehicle(of: &str, options: &Robot) -> hydrograd::Result<(Scene, Added)> {
         <worldbody><site name="nowhere"/><body name="hull" quat="0.5 0.5 0.5 0.5"><freejoint/><geom type="ellipsoid" size="0.3 0.2 0.1" mass="20"/>
         <site name="port" pos="-0.2 0.1 0.05" euler="0 90 0"/><site name="up" pos="0 0 0.1"/>
         <body name="wing" pos="0 0.2 0" euler="90 0 0"><geom type="sphere" size="0.02" mass="0.1"/><site name="tip" pos="0 0 0.1"/></body>
-        </body></worldbody><actuator>{{of}}</actuator></mujoco>"#
-    )
-    .replace("{of}", of);
+        </body></worldbody><actuator>{of}</actuator></mujoco>"#
+    );
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("vehicle.xml");
     std::fs::write(&path, text).unwrap();
@@ -217,7 +216,10 @@ fn actuators_of_sites_are_thrusters() {
     let mut wrong = scene.clone();
     wrong.add_force(Thruster::new("port").into());
     let error = wrong.validate().unwrap_err().to_string();
-    says(error, &["\"port\"", "it is a site", "\"hull\"", "[-0.2, 0.1, 0.05]"]);
+    says(
+        error,
+        &["\"port\"", "it is a site", "\"hull\"", "[-0.2, 0.1, 0.05]"],
+    );
     scene.gravity = [0.0; 3];
     let sim = Simulator::new(&scene, Settings::default().fidelity(Fidelity::Isolated)).unwrap();
     let hull = scene.body("hull").unwrap().0;

@@ -65,8 +65,10 @@ fn free() -> f64 {
         bytes => bytes as f64,
     };
     let machine = known(system.available_memory());
-    let group = system.cgroup_limits();
-    let group = group.map_or(f64::INFINITY, |limits| known(limits.free_memory));
+    // What a group keeps of files that it has read or written it gives back when it is asked: that isn't taken.
+    let group = system.cgroup_limits().map_or(f64::INFINITY, |limits| {
+        (known(limits.total_memory) - limits.rss as f64).max(0.0)
+    });
     machine.min(group).min(own_limit(&mut system))
 }
 

@@ -73,28 +73,30 @@ impl System {
         q: &DVector<f64>,
         time: f64,
         enough: f64,
-        pencil: impl Fn(&Evaluation) -> Pencil,
+        pencil: impl Fn(&Evaluation) -> Option<Pencil>,
     ) -> Result<Option<Fastest>> {
         let kinematics = self.kinematics(q)?;
         let (still, report) = (FluidMomenta::Still, Default::default());
         let dry = Evaluation::new(self, parameters, q, time, kinematics, still, report);
         // The water only adds to the inertia, but where a given added mass is smaller than what others change of it.
         let fast = |found: &Fastest| found.rate > enough;
-        let alone = self.fastest_of(&pencil(&dry));
+        let alone = self.fastest_of(pencil(&dry));
         let is_slow = matches!(&alone, Ok(found) if found.is_none_or(|found| !fast(&found)));
         if is_slow || !self.in_water(parameters) {
             return Ok(alone.ok().flatten().filter(fast));
         }
         let wet = self.evaluate_apart(parameters, q, time)?;
-        Ok(self.fastest_of(&pencil(&wet)).ok().flatten().filter(fast))
+        Ok(self.fastest_of(pencil(&wet)).ok().flatten().filter(fast))
     }
 
-    /// None of a first matrix that is zero.
-    fn fastest_of(&self, pencil: &Pencil) -> std::result::Result<Option<Fastest>, Indefinite> {
-        let Pencil { islands, of, by } = pencil;
-        if of.iter().all(|column| column.iter().all(|x| *x == 0.0)) {
+    /// None where there is no pencil.
+    fn fastest_of(
+        &self,
+        pencil: Option<Pencil>,
+    ) -> std::result::Result<Option<Fastest>, Indefinite> {
+        let Some(Pencil { islands, of, by }) = pencil else {
             return Ok(None);
-        }
+        };
         let mut free = vec![None; islands.velocities()];
         for (b, (drive, link)) in self.drives.iter().zip(self.tree.links()).enumerate() {
             if *drive == Drive::Free {
@@ -102,7 +104,7 @@ impl System {
             }
         }
         let mut found: Option<Fastest> = None;
-        for ((island, of), (_, by)) in islands.blocks(of).zip(islands.blocks(by)) {
+        for ((island, of), (_, by)) in islands.blocks(&of).zip(islands.blocks(&by)) {
             let own: Vec<usize> = (0..island.len())
                 .filter(|k| free[island[*k]].is_some())
                 .collect();
@@ -127,24 +129,36 @@ impl System {
 /// An inertia that isn't positive definite.
 struct Indefinite;
 
+/// Whether any entry isn't zero.
+fn is_any(columns: &[DVector<f64>]) -> bool {
+    columns
+        .iter()
+        .any(|column| column.iter().any(|x| *x != 0.0))
+}
+
 impl Evaluation<'_> {
-    /// D by M.
-    fn slowing(&self, v: &DVector<f64>, control: &DVector<f64>) -> Pencil {
+    /// D by M; none where nothing is slowed.
+    fn slowing(&self, v: &DVector<f64>, control: &DVector<f64>) -> Option<Pencil> {
         let islands = self.islands();
         let changes = islands.changes();
-        Pencil {
-            of: self.slowed(v, control, &changes),
+        let of = self.slowed(v, control, &changes);
+        is_any(&of).then(|| Pencil {
+            of,
             by: changes.iter().map(|v| self.mass_alone_times(v)).collect(),
             islands,
-        }
+        })
     }
 
-    /// K by M, or by M + ½ Δt D, at rest.
-    fn swinging(&self, control: &DVector<f64>, implicit: Option<f64>) -> Pencil {
+    /// K by M, or by M + ½ Δt D, at rest; none where nothing is held.
+    fn swinging(&self, control: &DVector<f64>, implicit: Option<f64>) -> Option<Pencil> {
         let islands = self.islands();
         let changes = islands.changes();
         let rest = DVector::zeros(islands.velocities());
         let held = |z: &DVector<f64>| -self.user_loads_vjp(&rest, control, z).q;
+        let of: Vec<_> = changes.iter().map(held).collect();
+        if !is_any(&of) {
+            return None;
+        }
         let mut by: Vec<_> = changes.iter().map(|v| self.mass_alone_times(v)).collect();
         if let Some(dt) = implicit {
             let slowed = self.slowed(&rest, control, &changes);
@@ -152,11 +166,7 @@ impl Evaluation<'_> {
                 .zip(&slowed)
                 .for_each(|(m, d)| *m += 0.5 * dt * d);
         }
-        Pencil {
-            of: changes.iter().map(held).collect(),
-            by,
-            islands,
-        }
+        Some(Pencil { of, by, islands })
     }
 
     fn slowed(

@@ -13,14 +13,15 @@ use std::sync::Arc;
 
 struct Carried {
     bodies: Vec<Body>,
-    displaced: Vec<Displaced>,
     streams: Arc<Streams>,
 }
 
 struct Body {
     body: usize,
-    /// Its own added mass at unit density, body's frame, about its origin.
-    added: Mat6,
+    /// Its own added mass at unit density, body's frame, about its origin, if it is in the water.
+    added: Option<Mat6>,
+    /// What it and its floats displace.
+    displaced: Vec<Displaced>,
 }
 
 /// A body in the stream, its own frame.
@@ -41,18 +42,30 @@ pub(super) fn assemble(
     if parts.streams.is_empty() || parts.scene.fluid.density <= 0.0 {
         return None;
     }
-    let own = parts.added_mass.iter();
-    let bodies = own.map(|(body, added)| Body {
-        body: *body,
-        added: *added,
-    });
     let mut displaced = of_bodies(parts);
     displaced.extend(of_floats(parts, parameters));
-    Some(Box::new(Carried {
-        bodies: bodies.collect(),
-        displaced,
-        streams: parts.streams.clone(),
-    }))
+    let body = |body: usize| {
+        let own = parts.added_mass.iter().find(|(b, _)| *b == body);
+        Body {
+            body,
+            added: own.map(|(_, added)| *added),
+            displaced: displaced
+                .iter()
+                .filter(|d| d.body == body)
+                .copied()
+                .collect(),
+        }
+    };
+    let bodies = (0..parts.bodies.len()).map(body);
+    let bodies: Vec<_> = bodies
+        .filter(|b| b.added.is_some() || !b.displaced.is_empty())
+        .collect();
+    (!bodies.is_empty()).then(|| {
+        Box::new(Carried {
+            bodies,
+            streams: parts.streams.clone(),
+        }) as Box<dyn ForceModel>
+    })
 }
 
 impl Carried {
@@ -72,28 +85,6 @@ impl Carried {
             },
         }
     }
-
-    /// Adds what belongs to the water at a body and to its pose, of cotangents in the body's frame; `wrench` is what acts there, world.
-    fn add_stream_bar(
-        &self,
-        b: usize,
-        (at, s): (&Moving, &Streamed),
-        (virt, wrench): (&Vec6, &Vec6),
-        own: &Stream,
-        bar: &mut LoadBars,
-    ) {
-        let world = |x: &Vec3| s.pose.rotation * x;
-        let water_bar = Undisturbed {
-            velocity: world(&own.velocity),
-            acceleration: world(&own.acceleration),
-        };
-        // The rotation of the frame acts on the virtual twist, and on what is known of the water.
-        bar.pose[b] -= cross_force(virt, wrench);
-        let turned = water_bar.velocity.cross(&s.water.velocity)
-            + water_bar.acceleration.cross(&s.water.acceleration);
-        bar.pose[b] += six(&Vec3::zeros(), &turned);
-        self.streams.at_body_vjp(b, &at.place, &water_bar, bar);
-    }
 }
 
 /// The wrench of a pressure that accelerates the water, per mass of what is displaced at a point, body's frame.
@@ -101,8 +92,18 @@ fn pressed(center: &Vec3, stream: &Stream) -> Vec6 {
     six(&stream.acceleration, &center.cross(&stream.acceleration))
 }
 
-fn mass(displaced: &Displaced, parameters: &Parameters) -> f64 {
-    parameters.density() * parameters[displaced.volume]
+impl Body {
+    /// The wrench at unit density, body's frame.
+    fn unit(&self, at: &Streamed, parameters: &Parameters) -> Vec6 {
+        let own = self
+            .added
+            .map(|added| stream_wrench(&added, &at.nu, &at.stream));
+        let each = self.displaced.iter().map(|displaced| {
+            let center = displaced.point.at(parameters);
+            parameters[displaced.volume] * pressed(&center, &at.stream)
+        });
+        own.into_iter().chain(each).sum()
+    }
 }
 
 impl ForceModel for Carried {
@@ -114,14 +115,8 @@ impl ForceModel for Carried {
         let parameters = at.place.parameters;
         for body in &self.bodies {
             let s = self.streamed(body.body, at);
-            let wrench = parameters.density() * stream_wrench(&body.added, &s.nu, &s.stream);
+            let wrench = parameters.density() * body.unit(&s, parameters);
             out.wrenches[body.body] += s.pose.wrench_to_world(&wrench);
-        }
-        for displaced in &self.displaced {
-            let s = self.streamed(displaced.body, at);
-            let center = displaced.point.at(parameters);
-            let wrench = mass(displaced, parameters) * pressed(&center, &s.stream);
-            out.wrenches[displaced.body] += s.pose.wrench_to_world(&wrench);
         }
     }
 
@@ -131,9 +126,10 @@ impl ForceModel for Carried {
             acceleration: Vec3::zeros(),
         };
         for body in &self.bodies {
+            let Some(added) = &body.added else { continue };
             let s = self.streamed(body.body, at);
             let dnu = s.pose.twist_to_body(&change.twists[body.body]);
-            let unit = stream_wrench_jvp(&body.added, &s.nu, &s.stream, &dnu, &still);
+            let unit = stream_wrench_jvp(added, &s.nu, &s.stream, &dnu, &still);
             let wrench = at.place.parameters.density() * unit;
             out.wrenches[body.body] += s.pose.wrench_to_world(&wrench);
         }
@@ -150,36 +146,35 @@ impl ForceModel for Carried {
             }
             let s = self.streamed(b, at);
             let zeta = s.pose.twist_to_body(virt);
-            let unit = stream_wrench(&body.added, &s.nu, &s.stream);
+            let unit = body.unit(&s, parameters);
             bar.parameters[DENSITY] += zeta.dot(&unit);
-            let made = stream_wrench_vjp(&body.added, &s.nu, &s.stream, &(density * zeta));
-            let nu_bar = s.pose.wrench_to_world(&made.nu);
-            bar.twist[b] += nu_bar;
-            bar.pose[b] -= cross_force(&s.past, &nu_bar);
-            let wrench = s.pose.wrench_to_world(&(density * unit));
-            self.add_stream_bar(b, (at, &s), (virt, &wrench), &made.stream, bar);
-        }
-        for displaced in &self.displaced {
-            let b = displaced.body;
-            let virt = &z.twists[b];
-            if *virt == Vec6::zeros() {
-                continue;
+            let world = |x: &Vec3| s.pose.rotation * x;
+            let mut water_bar = Undisturbed::default();
+            if let Some(added) = &body.added {
+                let made = stream_wrench_vjp(added, &s.nu, &s.stream, &(density * zeta));
+                let nu_bar = s.pose.wrench_to_world(&made.nu);
+                bar.twist[b] += nu_bar;
+                bar.pose[b] -= cross_force(&s.past, &nu_bar);
+                water_bar.velocity += world(&made.stream.velocity);
+                water_bar.acceleration += world(&made.stream.acceleration);
             }
-            let s = self.streamed(b, at);
-            let zeta = s.pose.twist_to_body(virt);
-            let (mass, center) = (mass(displaced, parameters), displaced.point.at(parameters));
-            let unit = pressed(&center, &s.stream);
-            let along = zeta.dot(&unit);
-            bar.parameters[DENSITY] += parameters[displaced.volume] * along;
-            bar.parameters[displaced.volume] += density * along;
-            let center_bar = mass * s.stream.acceleration.cross(&angular(&zeta));
-            displaced.point.add(&center_bar, bar.parameters);
-            let stream_bar = Stream {
-                velocity: Vec3::zeros(),
-                acceleration: mass * (linear(&zeta) + angular(&zeta).cross(&center)),
-            };
-            let wrench = s.pose.wrench_to_world(&(mass * unit));
-            self.add_stream_bar(b, (at, &s), (virt, &wrench), &stream_bar, bar);
+            for displaced in &body.displaced {
+                let center = displaced.point.at(parameters);
+                let mass = density * parameters[displaced.volume];
+                let along = zeta.dot(&pressed(&center, &s.stream));
+                bar.parameters[displaced.volume] += density * along;
+                let center_bar = mass * s.stream.acceleration.cross(&angular(&zeta));
+                displaced.point.add(&center_bar, bar.parameters);
+                let pushed = linear(&zeta) + angular(&zeta).cross(&center);
+                water_bar.acceleration += world(&(mass * pushed));
+            }
+            // The rotation of the frame acts on both twists, and on what is known of the water.
+            let wrench = s.pose.wrench_to_world(&(density * unit));
+            bar.pose[b] -= cross_force(virt, &wrench);
+            let turned = water_bar.velocity.cross(&s.water.velocity)
+                + water_bar.acceleration.cross(&s.water.acceleration);
+            bar.pose[b] += six(&Vec3::zeros(), &turned);
+            self.streams.at_body_vjp(b, &at.place, &water_bar, bar);
         }
     }
 
@@ -188,9 +183,7 @@ impl ForceModel for Carried {
     }
 
     fn outside(&self, group: &Together, parameters: &Parameters) -> Outside {
-        let mut each = (self.bodies.iter().map(|body| body.body))
-            .chain(self.displaced.iter().map(|displaced| displaced.body));
-        let held = each.any(|b| group.holds(b));
+        let held = self.bodies.iter().any(|body| group.holds(body.body));
         match held && !self.streams.rest(parameters) {
             true => Outside::All,
             false => Outside::Nothing,

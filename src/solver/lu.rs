@@ -1,9 +1,9 @@
 //! Dense LU with partial pivoting, in the memory of the matrix, parallel over fixed groups of columns.
 
+use super::matmul;
 use super::{CALLS, condition, largest_eigenvalue, product, transposed_product};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
-use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
 use faer::perm::PermRef;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -153,7 +153,7 @@ fn factor(data: &mut [f64], n: usize) -> Vec<usize> {
             let columns = MatMut::from_column_major_slice_mut(columns, n, count);
             let (mut top, bottom) = columns.subrows_mut(k, rows).split_at_row_mut(width);
             solve_unit_lower_triangular_in_place(corner, top.as_mut(), Par::Seq);
-            matmul(bottom, Accum::Add, below, top.as_ref(), -1.0, Par::Seq);
+            matmul(bottom, Accum::Add, below, top.as_ref(), -1.0);
         });
     }
     permutation

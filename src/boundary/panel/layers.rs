@@ -20,8 +20,8 @@
 use crate::adjoint::kernel::{Sources, Triangles, Write, flux_fill};
 use crate::adjoint::lie::Vec3;
 use crate::geometry::{Faces, TriMesh};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
+use crate::solver::matmul;
+use faer::{Accum, MatMut, MatRef};
 use pulp::Arch;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -224,11 +224,11 @@ impl Panels {
                     let s = self.single_layer(points, &omega);
                     // By panels and points: the matrix points × panels by columns.
                     let s = MatRef::from_column_major_slice(&s, rows, n);
-                    matmul(out.as_mut(), Accum::Replace, s, q, 1.0, Par::Seq);
+                    matmul(out.as_mut(), Accum::Replace, s, q, 1.0);
                 }
                 if let Some(phi) = double {
                     let omega = MatRef::from_column_major_slice(&omega, rows, n);
-                    matmul(out, Accum::Add, omega, phi, -1.0, Par::Seq);
+                    matmul(out, Accum::Add, omega, phi, -1.0);
                 }
             });
         out

@@ -18,9 +18,9 @@ use crate::coupling::{
 };
 use crate::once::once;
 use crate::solver::Cholesky;
-use faer::linalg::matmul::matmul;
+use crate::solver::matmul;
 use faer::reborrow::ReborrowMut;
-use faer::{Accum, MatRef, Par};
+use faer::{Accum, MatRef};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, OnceLock};
 
@@ -138,8 +138,8 @@ impl<'a> ReducedLinearised<'a> {
             let mut own = all.rb_mut().subrows_mut(points.start, points.len());
             let a = view(a).subrows(modes.start, modes.len());
             let twists = view(twists).subrows(6 * b, 6);
-            matmul(own.rb_mut(), Accum::Replace, l, a, 1.0, Par::Seq);
-            matmul(own.rb_mut(), Accum::Add, u, twists, 1.0, Par::Seq);
+            matmul(own.rb_mut(), Accum::Replace, l, a, 1.0);
+            matmul(own.rb_mut(), Accum::Add, u, twists, 1.0);
         }
         out
     }

@@ -12,9 +12,9 @@ use super::spare::Spare;
 use super::sums::Sums;
 use crate::adjoint::multipole::{self, WIDTH};
 use crate::solver::dot;
-use faer::linalg::matmul::matmul;
+use crate::solver::matmul;
 use faer::prelude::IntoConst;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -76,7 +76,7 @@ impl Blocks {
             let of_points = MatRef::from_column_major_slice(&of_points, n, carrier.nrows());
             let mut own = vec![0.0; n * carrier.ncols()];
             let out = MatMut::from_column_major_slice_mut(&mut own, n, carrier.ncols());
-            matmul(out, Accum::Replace, of_points, carrier, 1.0, Par::Seq);
+            matmul(out, Accum::Replace, of_points, carrier, 1.0);
             own
         });
         let all = &sums.pairs.near;
@@ -241,7 +241,7 @@ impl Room {
                 let half = &mut self.half[..];
                 let mut half = MatMut::from_column_major_slice_mut(half, a.len(), columns);
                 let to = half.as_mut();
-                matmul(to, Accum::Replace, inverse, carrier, 1.0, Par::Seq);
+                matmul(to, Accum::Replace, inverse, carrier, 1.0);
                 half.into_const()
             }
         };
@@ -249,7 +249,7 @@ impl Room {
             Some(carrier) => {
                 let own = MatMut::from_column_major_slice_with_stride_mut(own, rows, columns, room);
                 let carrier = carrier.transpose();
-                matmul(own, Accum::Replace, carrier, half, weight, Par::Seq);
+                matmul(own, Accum::Replace, carrier, half, weight);
             }
             // That of the second is as long as the first's points.
             None => fill(own, &self.half, rows),

@@ -32,10 +32,10 @@ mod tridiagonal;
 
 use super::confocal::{Confocal, Place};
 use crate::adjoint::lie::Vec3;
+use crate::solver::matmul;
 use crate::{Error, Result};
-use faer::linalg::matmul::matmul;
 use faer::reborrow::ReborrowMut;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef};
 use legendre::Legendre;
 use radial::{Grid, Radial, Spot};
 use rayon::prelude::*;
@@ -242,7 +242,7 @@ impl Harmonics {
                 None => own.copy_from(&basis),
                 Some(v) => {
                     let (add, v) = (Accum::Replace, v.transpose());
-                    matmul(own.rb_mut(), add, v, basis.as_ref(), 1.0, Par::Seq);
+                    matmul(own.rb_mut(), add, v, basis.as_ref(), 1.0);
                 }
             }
         }
@@ -380,7 +380,7 @@ fn add_product(out: &mut Mat<f64>, left: MatRef<f64>, right: MatRef<f64>, scale:
     let blocks = blocks(out.as_mut());
     blocks.into_par_iter().enumerate().for_each(|(i, block)| {
         let right = right.subcols(POINTS * i, block.ncols());
-        matmul(block, Accum::Add, left.transpose(), right, scale, Par::Seq);
+        matmul(block, Accum::Add, left.transpose(), right, scale);
     });
 }
 

@@ -1020,10 +1020,13 @@ class Rollout:
         numbers count from the end: -1 is the last step."""
     def pressure(self, state: int) -> list[SurfacePressure]:
         """The water's pressure on the surface of every body in it at state `state`, as the step there starts: one a body. It takes solves of its own. Negative numbers count
-        states from the end."""
+        states from the end. At the last state (-1) no step begins, as of `loads`: the water answers accelerations without controls and contact."""
     def loads(self, state: int) -> Loads:
         """What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
-        numbers count from the end."""
+        numbers count from the end.
+
+        At the last state (-1) no step begins: no control acts, nothing touches and no joint's stop presses, so that what lay or was held accelerates there. What presses at the end
+        of a run is that of state -2."""
     def imu(self, site: str) -> _Array:
         """What an inertial measurement unit at the site of this name reads at every state (n, 6): acceleration less gravity (m/s²) and rates (rad/s), in the site's axes. At the last state no step begins: no control acts, and nothing touches."""
     def flow(self, state: int, points: ArrayLike) -> _Array:

@@ -72,9 +72,16 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
     }
     let options = PyDict::new(py);
     options.set_item("default", wrap_pyfunction!(written, py)?)?;
-    let json = py
-        .import("json")?
-        .call_method("dumps", (plain,), Some(&options));
+    options.set_item("allow_nan", false)?;
+    let json = py.import("json")?;
+    for (key, value) in &plain {
+        if let Err(why) = json.call_method("dumps", (&value,), Some(&options)) {
+            let remedy = "must be what a scene file's [[robot]] has, its numbers finite";
+            let why = format!("{} ({})", value.repr()?, why.value(py));
+            return Err(input(&format!("robot: {key}"), why, remedy));
+        }
+    }
+    let json = json.call_method("dumps", (plain,), Some(&options));
     let text: String = json.map_err(not_a_choice)?.extract()?;
     let mut robot: hydrograd::scene::Robot = serde_json::from_str(&text).map_err(not_a_choice)?;
     robot.motions = motions;

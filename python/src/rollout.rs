@@ -265,13 +265,16 @@ impl Rollout {
 
     /// What acts on every body and across every joint at state `state`, as the step there starts: gravity, buoyancy, drag, thrust, the inertia of the water, contact. Negative
     /// numbers count from the end.
+    ///
+    /// At the last state (-1) no step begins: no control acts, nothing touches and no joint's stop presses, so that what lay or was held accelerates there. What presses at the end
+    /// of a run is that of state -2.
     fn loads(&self, py: Python<'_>, state: isize) -> PyResult<Loads> {
         let at = array::numbered(state, self.inner.states().len(), "state")?;
         short(py, || self.inner.loads(at)).map(Loads)
     }
 
     /// The water's pressure on the surface of every body in it at state `state`, as the step there starts: one a body. It takes solves of its own. Negative numbers count
-    /// states from the end.
+    /// states from the end. At the last state (-1) no step begins, as of `loads`: the water answers accelerations without controls and contact.
     fn pressure(&self, py: Python<'_>, state: isize) -> PyResult<Vec<SurfacePressure>> {
         let at = array::numbered(state, self.inner.states().len(), "state")?;
         let inner = self.inner.clone();

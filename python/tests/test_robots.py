@@ -277,6 +277,7 @@ def test_choices_that_can_not_be_are_refused():
         ({"start": {"arm_elbow": 9.0}}, "arm_elbow"),
         ({"start": hg.Drag(quadratic=1.0)}, "quadratic.*no such name"),
         ({"drga": hg.Drag(quadratic=1.0)}, "drga"),
+        ({"start": {"arm_elbow": float("nan")}}, "robot: start.*nan.*finite"),
         ({"urdf": "other.urdf"}, "urdf.*other.urdf.*first argument"),
     ]:
         with pytest.raises(hg.InputError, match=words):

@@ -7,6 +7,7 @@
 use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity};
 use crate::adjoint::rigid::inertia_matrix;
+use crate::dynamics::force::ForceModel;
 use crate::dynamics::{Drive, Integrator, System};
 use crate::error::readable;
 use nalgebra::DVector;
@@ -140,9 +141,10 @@ impl Rollout {
             ),
         };
         Some(format!(
-            "the energy grows by {gained:.3e} J, {:.1} % of the largest kinetic energy, by t = {} s, {work}: {cause}",
-            100.0 * gained / kinetic,
+            "the energy grows by {:.3e} J by t = {} s, {work}, by {:.1} % of the largest kinetic energy: {cause}",
+            worst.0.energy() - first,
             worst.0.time,
+            100.0 * gained / kinetic,
         ))
     }
 
@@ -162,25 +164,38 @@ impl Rollout {
             return vec![0.0; samples.len()];
         }
         let rates: Vec<DVector<f64>> = samples.iter().map(|s| control_rates(system, s)).collect();
-        let driven = |n: usize, of: &Sample| self.driven_power(&samples[n], &of.control).abs();
         let mut out = vec![0.0];
         let mut so_far = 0.0;
         for (n, s) in samples.iter().enumerate().take(samples.len() - 1) {
             for (i, u) in s.control.iter().enumerate() {
                 so_far += dt * u.abs() * rates[n][i].abs().max(rates[n + 1][i].abs());
             }
-            so_far += dt * driven(n, s).max(driven(n + 1, s));
+            so_far += dt * self.driven_power([s, &samples[n + 1]]);
             out.push(so_far);
         }
         out
     }
 
-    /// Power that these controls put in at a state other than as forces of their own, W.
-    fn driven_power(&self, s: &Sample, control: &DVector<f64>) -> f64 {
+    /// The most power that the first state's controls can have put in by the second, other than as forces of their own, W. A servo's force is largest where it starts from
+    /// rest, with no power yet, and next to nothing where its joint is fast.
+    fn driven_power(&self, step: [&Sample; 2]) -> f64 {
         let (system, parameters) = (self.simulator.system(), self.simulator.parameters());
-        let twists = system.tree.twists(&system.tree.kinematics(&s.q), &s.v);
-        let at = system.moving(s.place(parameters), &twists, &s.v, control);
-        system.forces.iter().map(|f| f.driven_power(&at)).sum()
+        let twists = step.map(|s| system.tree.twists(&system.tree.kinematics(&s.q), &s.v));
+        let [start, end] = [0, 1].map(|k| {
+            let place = step[k].place(parameters);
+            system.moving(place, &twists[k], &step[k].v, &step[0].control)
+        });
+        let pairs = [
+            (&start, &start),
+            (&start, &end),
+            (&end, &start),
+            (&end, &end),
+        ];
+        let most = |f: &dyn ForceModel| {
+            let each = pairs.map(|(at, moving)| f.driven_power(at, moving));
+            each.into_iter().fold(0.0, f64::max)
+        };
+        system.forces.iter().map(|f| most(f.as_ref())).sum()
     }
 
     /// Kinetic energy far beyond what motions and the current could give.

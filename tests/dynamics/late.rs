@@ -172,3 +172,28 @@ fn gradients_are_those_of_the_steps() {
         }
     }
 }
+
+/// From rest a servo's force is at once at its largest, where it has no power yet, and is spent where its joint is fast: no energy comes from nowhere, whatever the step.
+#[test]
+fn a_servo_that_starts_from_rest_is_not_called_unstable() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    scene.gravity = [0.0, 0.0, -9.81];
+    scene.add(
+        Body::new(Shape::cuboid([0.02, 0.03, 0.05]).faces(200))
+            .density(2700.0)
+            .joint(Joint::Prismatic {
+                axis: [-1.0, 0.0, 0.0],
+            })
+            .actuated()
+            .servo(Servo::new(4000.0, 40.0)),
+    );
+    for integrator in [Integrator::MomentumEuler, Integrator::Midpoint] {
+        for dt in [0.02, 0.01, 0.005, 0.004, 0.003, 0.002, 0.001] {
+            let simulator = simulator(&scene, integrator, dt);
+            let controls = DMatrix::from_element(1, (0.1 / dt) as usize, 0.015);
+            let controls = Controls::from_matrix(&simulator, controls).unwrap();
+            let told = simulator.rollout(&controls).unwrap().warnings();
+            assert!(told.is_empty(), "{integrator:?}, {dt} s: {told:?}");
+        }
+    }
+}

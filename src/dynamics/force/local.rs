@@ -175,11 +175,11 @@ impl<L: Law> ForceModel for Local<L> {
         self.laws.iter().all(|law| law.is_conservative(parameters))
     }
 
-    fn driven_power(&self, at: &Moving) -> f64 {
+    fn driven_power(&self, at: &Moving, moving: &Moving) -> f64 {
         let power = |law: &L| {
             let b = law.body();
-            let nu = at.place.poses[b].twist_to_body(&at.relative(b));
-            law.driven_power(&nu, at)
+            let nu = moving.place.poses[b].twist_to_body(&moving.relative(b));
+            law.driven_power(&nu, at).abs()
         };
         self.laws.iter().map(power).sum()
     }

@@ -393,8 +393,9 @@ pub trait ForceModel: Send + Sync {
         false
     }
 
-    /// Power that controls put in beyond that of joint forces and wrenches which are controls themselves, W; for warnings of energy from nowhere.
-    fn driven_power(&self, _at: &Moving) -> f64 {
+    /// The most power, W, that controls put in beyond that of joint forces and wrenches which are controls themselves, by forces as `at` one state and velocities as of another,
+    /// `moving`: over a step either may be that of its start or of its end. For warnings of energy from nowhere.
+    fn driven_power(&self, _at: &Moving, _moving: &Moving) -> f64 {
         0.0
     }
 

@@ -126,8 +126,8 @@ impl ForceModel for Rotors {
         }
     }
 
-    fn driven_power(&self, at: &Moving) -> f64 {
-        let power = |r: &Rotor| r.force(at) * at.v[r.rate];
+    fn driven_power(&self, at: &Moving, moving: &Moving) -> f64 {
+        let power = |r: &Rotor| (r.force(at) * moving.v[r.rate]).abs();
         self.0.iter().map(power).sum()
     }
 }

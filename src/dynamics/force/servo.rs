@@ -113,10 +113,10 @@ impl ForceModel for Servos {
         }
     }
 
-    fn driven_power(&self, at: &Moving) -> f64 {
+    fn driven_power(&self, at: &Moving, moving: &Moving) -> f64 {
         self.each
             .iter()
-            .map(|s| self.force(s, at) * at.v[s.v])
+            .map(|s| (self.force(s, at) * moving.v[s.v]).abs())
             .sum()
     }
 

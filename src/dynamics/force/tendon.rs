@@ -155,11 +155,11 @@ impl ForceModel for Tendons {
         self.0.iter().all(|t| parameters[t.damping] == 0.0)
     }
 
-    fn driven_power(&self, at: &Moving) -> f64 {
+    fn driven_power(&self, at: &Moving, moving: &Moving) -> f64 {
         let parameters = at.place.parameters;
         let power = |t: &Tendon| {
             let pulled = parameters[t.gain] * at.control[t.control];
-            parameters[t.stiffness] * pulled * t.rate(at.v)
+            (parameters[t.stiffness] * pulled * t.rate(moving.v)).abs()
         };
         self.0.iter().map(power).sum()
     }

@@ -26,7 +26,7 @@ pub(super) fn law(actuator: &Actuator) -> Law {
     if !(plain && lags) {
         return Law::Other;
     }
-    let [k, c] = [1, 2].map(|i| -one(&actuator.biasprm, i));
+    let [k, c] = [1, 2].map(|i| 0.0 - one(&actuator.biasprm, i));
     match actuator.bias_type.as_deref() {
         None | Some("none") => Law::Force,
         Some("affine") if k != 0.0 => Law::Servo([k, c]),
@@ -74,7 +74,7 @@ impl Made<'_> {
                     }
                     drives.insert(joint.clone(), Some([k, c]));
                     format!(
-                        "the file's actuator of joint {joint:?} is a servo (stiffness {k}, damping {c}): unless chosen otherwise its control is where the joint shall be, rad or m, whatever gear and gain"
+                        "the file's actuator of joint {joint:?} is a servo (stiffness {k}, damping {c}): unless chosen otherwise its control is where the joint shall be, rad or m, whatever gear, gain and constant bias"
                     )
                 }
                 Law::Force => {

@@ -78,7 +78,7 @@ fn choices(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<hydrog
         if let Err(why) = json.call_method("dumps", (&value,), Some(&options)) {
             let remedy = "must be what a scene file's [[robot]] has, its numbers finite";
             let why = format!("{} ({})", value.repr()?, why.value(py));
-            return Err(input(&format!("robot: {key}"), why, remedy));
+            return Err(input(format!("robot: {key}"), why, remedy));
         }
     }
     let json = json.call_method("dumps", (plain,), Some(&options));

@@ -1,6 +1,7 @@
 //! What tells that a run isn't to be trusted: drag or springs too stiff for an integrator's step, and energy that comes from nowhere.
 //!
-//! Energy may come from controls, which have done at most Σ Δt Σ |uᵢ| |rᵢ| by a state, rᵢ being the faster of a control's rates at both ends of a step; from a motion
+//! Energy may come from controls, which have done at most Σ Δt Σ |uᵢ| |rᵢ| by a state, rᵢ being the faster of a control's rates at both ends of a step (of servos, rotors, tendons and
+//! thrusters the force is the larger of both ends, too); from a motion
 //! that drives a joint or a current past what doesn't drift, whose work isn't known, but is of the order of the kinetic energy of all bodies at the speeds that these give
 //! them. So a run without the latter is told from a small part of its energy on, one with them where it runs away.
 
@@ -163,28 +164,35 @@ impl Rollout {
         if system.controls == 0 {
             return vec![0.0; samples.len()];
         }
-        let rates: Vec<DVector<f64>> = samples.iter().map(|s| control_rates(system, s)).collect();
+        let tree = &system.tree;
+        let twists: Vec<Vec<Vec6>> = (samples.iter())
+            .map(|s| tree.twists(&tree.kinematics(&s.q), &s.v))
+            .collect();
+        let moves: Vec<(&Sample, &[Vec6])> = (samples.iter())
+            .zip(twists.iter().map(|each| each.as_slice()))
+            .collect();
+        let rates: Vec<DVector<f64>> = (moves.iter())
+            .map(|(s, twists)| control_rates(system, s, twists))
+            .collect();
         let mut out = vec![0.0];
         let mut so_far = 0.0;
         for (n, s) in samples.iter().enumerate().take(samples.len() - 1) {
             for (i, u) in s.control.iter().enumerate() {
                 so_far += dt * u.abs() * rates[n][i].abs().max(rates[n + 1][i].abs());
             }
-            so_far += dt * self.driven_power([s, &samples[n + 1]]);
+            so_far += dt * self.driven_power([moves[n], moves[n + 1]]);
             out.push(so_far);
         }
         out
     }
 
-    /// The most power that the first state's controls can have put in by the second, other than as forces of their own, W. A servo's force is largest where it starts from
+    /// The most power that the first state's controls can have put in by the second, each with its bodies' twists, other than as forces of their own, W. A servo's force is largest where it starts from
     /// rest, with no power yet, and next to nothing where its joint is fast.
-    fn driven_power(&self, step: [&Sample; 2]) -> f64 {
+    fn driven_power(&self, step: [(&Sample, &[Vec6]); 2]) -> f64 {
         let (system, parameters) = (self.simulator.system(), self.simulator.parameters());
-        let twists = step.map(|s| system.tree.twists(&system.tree.kinematics(&s.q), &s.v));
-        let [start, end] = [0, 1].map(|k| {
-            let place = step[k].place(parameters);
-            system.moving(place, &twists[k], &step[k].v, &step[0].control)
-        });
+        let control = &step[0].0.control;
+        let [start, end] =
+            step.map(|(s, twists)| system.moving(s.place(parameters), twists, &s.v, control));
         let pairs = [
             (&start, &start),
             (&start, &end),
@@ -250,12 +258,10 @@ impl Rollout {
 }
 
 /// The rate that each control that is a force does work against.
-fn control_rates(system: &System, s: &Sample) -> DVector<f64> {
-    let tree = &system.tree;
-    let twists = tree.twists(&tree.kinematics(&s.q), &s.v);
+fn control_rates(system: &System, s: &Sample, twists: &[Vec6]) -> DVector<f64> {
     let mut out = DVector::zeros(system.controls);
     for ((body, link), (twist, pose)) in
-        (system.bodies.iter().zip(tree.links())).zip(twists.iter().zip(&s.poses))
+        (system.bodies.iter().zip(system.tree.links())).zip(twists.iter().zip(&s.poses))
     {
         if let Some(first) = body.joint_control {
             for (k, i) in link.v.clone().enumerate() {

@@ -1,7 +1,6 @@
 //! Dense LU with partial pivoting, in the memory of the matrix, parallel over fixed groups of columns.
 
-use super::matmul;
-use super::{CALLS, condition, largest_eigenvalue, product, transposed_product};
+use super::{CALLS, condition, largest_eigenvalue, matmul, product, transposed_product};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;

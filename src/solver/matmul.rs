@@ -1,6 +1,6 @@
 //! Products of dense matrices on the calling thread.
 
-use faer::linalg::matmul::matmul as unswept;
+use faer::linalg::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 
 /// `out = scale · left right`, or the same added to `out`.
@@ -15,7 +15,7 @@ pub(crate) fn matmul(
     right: MatRef<f64>,
     scale: f64,
 ) {
-    unswept(out, add, left, right, scale, Par::Seq);
+    matmul::matmul(out, add, left, right, scale, Par::Seq);
     #[cfg(target_arch = "x86_64")]
     if let Some(avx) = pulp::core_arch::x86::Avx::try_new() {
         avx._mm256_zeroupper();

@@ -2,7 +2,7 @@
 
 use super::graph::{code, sources, split_group};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Modules that each module may name, each of which stands above it. `error` is free for all, and so is the crate's root for
 /// `Error` and `Result` alone.
@@ -240,6 +240,17 @@ fn kernels_know_nothing_of_the_simulator() {
     let manifest = std::fs::read_to_string(root().join("adjoint/Cargo.toml")).unwrap();
     let depends = manifest.lines().any(|l| l.starts_with("hydrograd "));
     assert!(!depends, "hydrograd-adjoint depends on hydrograd");
+}
+
+/// After faer's own products functions such as `exp` are slow: src/solver/matmul.rs gives the registers back.
+#[test]
+fn products_of_matrices_go_by_the_solvers() {
+    let named = |path: &PathBuf| code(path).contains("linalg::matmul");
+    let found: Vec<PathBuf> = sources(&root().join("src"))
+        .into_iter()
+        .filter(named)
+        .collect();
+    assert_eq!(found, [root().join("src/solver/matmul.rs")]);
 }
 
 #[test]

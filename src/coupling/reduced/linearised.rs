@@ -17,8 +17,7 @@ use crate::coupling::{
     Pullback, ShapeTerm, SurfacePotential, Tangent,
 };
 use crate::once::once;
-use crate::solver::Cholesky;
-use crate::solver::matmul;
+use crate::solver::{Cholesky, matmul};
 use faer::reborrow::ReborrowMut;
 use faer::{Accum, MatRef};
 use nalgebra::{DMatrix, DVector};

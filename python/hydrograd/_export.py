@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hydrograd._hydrograd import InputError, Rollout
+from hydrograd._hydrograd import InputError, Rollout, Simulator
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -43,12 +43,17 @@ def to_pandas(rollout: Rollout) -> pandas.DataFrame:
     return pandas.DataFrame(columns, index=pandas.Index(columns.pop("time"), name="time"))
 
 
+def _units(sim: Simulator) -> str:
+    """Those of the controls, each once."""
+    return ", ".join(dict.fromkeys(sim.control_units))
+
+
 def to_xarray(rollout: Rollout) -> xarray.Dataset:
     """All of a rollout as labelled arrays with units in their attributes; needs xarray.
 
     `q` (time, coordinate) and `v` (time, velocity) by their names; of each body `positions`, `velocities` (of its origin, then angular; world axes),
     `angular_momentum` and `contact_forces` (time, body, axis), and `rotations` (time, body, row, column); `kinetic_energy`, `potential_energy`, `min_gap` (time);
-    `controls` (step, control) by their names, and `applied_controls`, which hold the controller's as well.
+    `controls` (step, control) by their names, each with its `control_unit`, and `applied_controls`, which hold the controller's as well.
     """
     xarray = _needs("xarray", "to_xarray")
     sim = rollout.simulator
@@ -59,8 +64,8 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
         "kinetic_energy": (("time",), rollout.kinetic_energy, {"units": "J"}),
         "potential_energy": (("time",), rollout.potential_energy, {"units": "J"}),
         "min_gap": (("time",), rollout.min_gap, {"units": "m"}),
-        "controls": (("step", "control"), rollout.controls, {"units": "N, N m"}),
-        "applied_controls": (("step", "control"), rollout.applied_controls, {"units": "N, N m"}),
+        "controls": (("step", "control"), rollout.controls, {"units": _units(sim)}),
+        "applied_controls": (("step", "control"), rollout.applied_controls, {"units": _units(sim)}),
     }
     coordinates: dict[str, Any] = {
         "time": ("time", rollout.time, {"units": "s"}),
@@ -68,6 +73,7 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
         "velocity": sim.v_names,
         "body": sim.body_names,
         "control": sim.control_names,
+        "control_unit": ("control", sim.control_units),
     }
     for name, (labels, unit) in OF_BODIES.items():
         axis = "axis" if len(labels) == 3 else "component"
@@ -91,7 +97,7 @@ def plot(rollout: Rollout, what: Sequence[str] = ("q", "v", "energy", "contact_f
     lines: dict[str, tuple[str, list[tuple[str, Any, Any]]]] = {
         "q": ("coordinates, m, rad", [(name, time, x) for name, x in zip(sim.q_names, rollout.q.T)]),
         "v": ("velocities, m/s, rad/s", [(name, time, x) for name, x in zip(sim.v_names, rollout.v.T)]),
-        "controls": ("controls, N, N m", [(name, time[:-1], u) for name, u in zip(sim.control_names, rollout.applied_controls.T)]),
+        "controls": (f"controls, {_units(sim)}", [(name, time[:-1], u) for name, u in zip(sim.control_names, rollout.applied_controls.T)]),
         "energy": (
             "energy, J",
             [

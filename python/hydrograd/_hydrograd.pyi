@@ -652,7 +652,8 @@ class Simulator:
     ) -> tuple[float, Gradient]:
         """Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is
         kept of the run: a rollout keeps some kilobytes a step, which is too much for 10⁵ steps and more. Parts of it run again, so it takes longer; the gradient is that of the
-        rollout, to rounding. `progress(done, total)` is called with the parts done, as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it."""
+        rollout, to rounding. Observables that are means over steps are refused. `progress(done, total)` is called with the parts done,
+        as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it."""
     def state(
         self,
         q: ArrayLike | None = None,
@@ -732,8 +733,11 @@ class Simulator:
         """Number of controls a step."""
     @property
     def control_names(self) -> list[str]:
-        """Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "hull.wrench.fx", … "hull.wrench.mz" are a body's wrench, and a thruster's
-        command has the thruster's name."""
+        """Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "arm.target.angle" is where a servo shall bring "arm.angle", "hull.wrench.fx", …
+        "hull.wrench.mz" are a body's wrench, and a thruster's command has the thruster's name."""
+    @property
+    def control_units(self) -> list[str]:
+        """Units of the controls, in order: "N", "N m", of servos' targets "m" or "rad", of a thruster's rotor "rad/s", "1" of what scales or curves make something else of."""
     @property
     def coordinate_names(self) -> list[str]:
         """Names of the joint coordinates, in order: "coin.y", "arm.angle", …"""

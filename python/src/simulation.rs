@@ -87,7 +87,7 @@ fn gathered(
 ) -> PyResult<Vec<Rollout>> {
     let (py, count) = (of.py(), made.len());
     let errors = PyDict::new(py);
-    let mut first = None;
+    let (mut first, mut foreign) = (None, None);
     let mut rollouts = Vec::with_capacity(count);
     for (b, one) in made.into_iter().enumerate() {
         let halted = match one {
@@ -98,27 +98,37 @@ fn gathered(
             Err(halted) => *halted,
         };
         let error = exception(halted.error);
-        if !own(py, &error) {
-            return Err(error);
-        }
         let value = error.value(py);
-        value.setattr("step", halted.step)?;
-        value.setattr("time", halted.time)?;
-        errors.set_item(b, value)?;
-        first.get_or_insert_with(|| {
-            let (step, time) = (halted.step, halted.time);
-            format!("member {b} in step {step}, from t = {time} s on: {value}")
-        });
+        let (step, time) = (halted.step, halted.time);
+        let place = format!("member {b} in step {step}, from t = {time} s on");
+        if own(py, &error) {
+            value.setattr("step", step)?;
+            value.setattr("time", time)?;
+            errors.set_item(b, value)?;
+            first.get_or_insert_with(|| format!("{place}: {value}"));
+        } else {
+            foreign.get_or_insert((error, step, time, place));
+        }
         rollouts.push(halted.rollout.map(|rollout| Rollout::new(of, rollout)));
     }
-    let Some(first) = first else {
+    if first.is_none() && foreign.is_none() {
         return Ok(rollouts.into_iter().flatten().collect());
-    };
-    let failed = errors.len();
-    let message = format!("{failed} of {count} members failed, counted from 0; {first}");
+    }
     let members = rollouts.into_iter();
     let members = members.map(|one| one.map(|one| Bound::new(py, one)).transpose());
     let members = members.collect::<PyResult<Vec<_>>>()?;
+    // What a controller raised comes out as it is, with all that ran; what can't hold that comes out by itself.
+    if let Some((error, step, time, place)) = foreign {
+        let value = error.value(py);
+        let _ = value.setattr("members", members);
+        let _ = value.setattr("step", step);
+        let _ = value.setattr("time", time);
+        let _ = value.call_method1("add_note", (format!("rollout_batch: {place}"),));
+        return Err(error);
+    }
+    let failed = errors.len();
+    let first = first.unwrap_or_default();
+    let message = format!("{failed} of {count} members failed, counted from 0; {first}");
     Err(batch(py, message, members.into_pyobject(py)?, errors))
 }
 
@@ -401,7 +411,8 @@ impl Simulator {
 
     /// Value and gradient of an `objective` of a run with `controls` (steps, control_size), or of `steps` steps, from where the simulator starts, within `memory` (bytes) for what is
     /// kept of the run: a rollout keeps some kilobytes a step, which is too much for 10⁵ steps and more. Parts of it run again, so it takes longer; the gradient is that of the
-    /// rollout, to rounding. `progress(done, total)` is called with the parts done, as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it.
+    /// rollout, to rounding. Observables that are means over steps are refused. `progress(done, total)` is called with the parts done,
+    /// as in `rollout`; what it raises ends the work and comes out. Ctrl-C ends it.
     #[pyo3(signature = (objective, controls=None, *, steps=None, memory=1e8, progress=None))]
     fn gradient_in_parts<'py>(
         &self,
@@ -696,11 +707,17 @@ impl Simulator {
         self.controls_size()
     }
 
-    /// Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "hull.wrench.fx", … "hull.wrench.mz" are a body's wrench, and a thruster's
-    /// command has the thruster's name.
+    /// Names of the controls, in order: "arm.force.rate" does work on the velocity "arm.rate", "arm.target.angle" is where a servo shall bring "arm.angle", "hull.wrench.fx", …
+    /// "hull.wrench.mz" are a body's wrench, and a thruster's command has the thruster's name.
     #[getter]
     fn control_names(&self) -> Vec<String> {
         self.inner.control_names()
+    }
+
+    /// Units of the controls, in order: "N", "N m", of servos' targets "m" or "rad", of a thruster's rotor "rad/s", "1" of what scales or curves make something else of.
+    #[getter]
+    fn control_units(&self) -> Vec<&'static str> {
+        self.inner.control_units()
     }
 
     /// Names of the joint coordinates, in order: "coin.y", "arm.angle", …

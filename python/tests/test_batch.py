@@ -51,6 +51,21 @@ def test_a_member_that_cannot_begin_has_nothing(sim):
     assert "overlap" in str(info.value.errors[1])
 
 
+def test_what_a_controller_raises_comes_out_with_all_that_ran(sim):
+    class Late:
+        def act(self, seen):
+            if seen.time > 0.05 and seen.v[0] > 0.0:
+                raise ValueError("late")
+            return np.zeros(12)
+
+    with pytest.raises(ValueError, match="^late$") as info:
+        sim.with_policy(Late()).rollout_batch(np.zeros((3, 10, 12)), v=0.1 * speeds([False, True, False]))
+    error = info.value
+    assert [rollout.steps for rollout in error.members] == [10, 6, 10] and error.step == 6
+    notes = getattr(error, "__notes__", ["member 1"])
+    assert any("member 1" in note for note in notes)
+
+
 def test_gradients_of_a_batch_are_those_of_its_rollouts(sim):
     rollouts = sim.rollout_batch(np.zeros((3, 4, 12)), v=speeds([False, True, False]))
     goal = hg.objective.final_position("right", (0.3, 0.1, 0.0)) + 1e-3 * hg.objective.effort(1.0)

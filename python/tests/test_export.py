@@ -35,6 +35,8 @@ def test_xarray(rollout):
     assert np.nanmax(np.abs(forces)) > 0.0  # the pebble lies on the floor
     assert np.array_equal(data.contact_forces, forces, equal_nan=True)
     assert list(data.control.values) == rollout.simulator.control_names
+    assert list(data.control_unit.values) == rollout.simulator.control_units == ["N", "N m", "N m"]
+    assert data.controls.attrs["units"] == "N, N m"
     assert data.controls.shape == (60, 3) and data.positions.attrs["units"] == "m"
     assert data.rotations.shape == (61, 4, 3, 3) and data.attrs["fidelity"] == "isolated"
 

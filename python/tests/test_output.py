@@ -110,6 +110,22 @@ def test_vtk_reads_the_flow(rollout, vtk, tmp_path):
         assert np.abs(arrays["velocity"][resolved] - right).max() < 1e-9
 
 
+def test_vtk_reads_frames_without_a_line(vtk, tmp_path):
+    """A seed that a body covers at first has a line once the body has left it."""
+    scene = hg.Scene(hg.Fluid(998.0))
+    scene.add(hg.Body(hg.sphere(0.1), density=998.0))
+    scene.set_initial(v=[0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    made = hg.Simulator(scene, dt=0.01, faces=80).rollout(steps=20).write_vtk(tmp_path, every=5, streamlines=([[0.0, 0.0, 0.0]], 0.3))
+    lines = next(file for file in made if file.name == "streamlines.pvd")
+    read = [vtk(file) for file in series(lines)[1]]
+    assert [data.GetNumberOfLines() for data, *_ in read] == [0, 0, 0, 1, 1]
+    for data, points, at_points, at_lines in read:
+        there = data.GetNumberOfLines() > 0
+        assert len(points) == (data.GetCell(0).GetNumberOfPoints() if there else 1)
+        assert len(at_points["velocity"]) == len(points) and np.isfinite(at_points["velocity"]).all() == there
+        assert at_lines["seed"].tolist() == [0] * there if there else not len(at_lines.get("seed", ()))
+
+
 def test_bodies_without_a_shape_are_points(vtk, tmp_path):
     scene = hg.Scene(gravity=(0.0, 0.0, -9.81))
     scene.add(hg.Body(hg.sphere(0.1), density=1000.0))

@@ -140,6 +140,11 @@ impl<'a> Recoiling<'a> {
         (v, found.left)
     }
 
+    /// v with M₀ v = `right` on the free rows; driven ones rest.
+    pub(super) fn alone(&self, right: &DVector<f64>) -> DVector<f64> {
+        (self.own.solve)(right)
+    }
+
     /// Of a velocity in the units of what is left.
     pub(super) fn size(&self, v: &DVector<f64>) -> f64 {
         self.twists(v).component_mul(&self.scale).norm()

@@ -131,6 +131,13 @@ pub(super) fn guarded<T, E: std::fmt::Display>(
     Err(parse_error(path, why))
 }
 
+/// What is wrong with elements within elements without end.
+pub(super) fn too_deep() -> String {
+    format!(
+        "elements are nested over {DEEPEST} deep: a longer chain of bodies can be a URDF, whose links stand side by side"
+    )
+}
+
 /// Refuses elements within elements without end.
 pub(super) fn check_depth(path: &Path, document: &Document) -> Result<()> {
     let mut open = vec![(document.root_element(), 1)];
@@ -138,7 +145,7 @@ pub(super) fn check_depth(path: &Path, document: &Document) -> Result<()> {
         if level > DEEPEST {
             let line = document.text_pos_at(node.range().start).row;
             let name = node.tag_name().name();
-            let message = format!("line {line}: <{name}>: elements are nested over {DEEPEST} deep");
+            let message = format!("line {line}: <{name}>: {}", too_deep());
             return Err(parse_error(path, message));
         }
         let inner = node.children().filter(Node::is_element);

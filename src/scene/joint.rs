@@ -63,14 +63,18 @@ impl Scene {
         self.all_thrusters().count() + self.all_tendons().count()
     }
 
-    /// Names of the controls, in order: `arm.force.rate` does work on the velocity `arm.rate`, `hull.wrench.fx`, …, `hull.wrench.mz` are a body's wrench, and a
-    /// thruster's command has the thruster's name.
+    /// Names of the controls, in order: `arm.force.rate` does work on the velocity `arm.rate`, `arm.target.angle` is where a servo shall bring `arm.angle`,
+    /// `hull.wrench.fx`, …, `hull.wrench.mz` are a body's wrench, and a thruster's command has the thruster's name.
     pub fn control_labels(&self) -> Vec<String> {
         let mut out = Vec::with_capacity(self.controls());
         for body in &self.bodies {
             if body.actuated {
-                let labels = body.joint.velocity_labels().iter();
-                out.extend(labels.map(|label| format!("{}.force.{label}", body.name)));
+                let (what, labels) = match body.servo {
+                    Some(_) => ("target", body.joint.coordinate_labels()),
+                    None => ("force", body.joint.velocity_labels()),
+                };
+                let labels = labels.iter();
+                out.extend(labels.map(|label| format!("{}.{what}.{label}", body.name)));
             }
             if body.thruster {
                 let labels = ["fx", "fy", "fz", "mx", "my", "mz"];
@@ -79,6 +83,41 @@ impl Scene {
         }
         out.extend(self.thrusters().map(|(i, _, _)| self.force_name(i)));
         out.extend(self.tendons().map(|(i, _, _)| self.force_name(i)));
+        out
+    }
+
+    /// Units of the controls, in order: of forces `N` and of moments `N m`, of targets of servos `m` and `rad`, of the velocity of a thruster's rotor `rad/s` (`m/s` where it slides), of other
+    /// commands `N` where they are the thrust itself, of what tendons shall be pulled by `m`, and `1` of what scales or curves make something else of.
+    pub fn control_units(&self) -> Vec<&'static str> {
+        let mut out = Vec::with_capacity(self.controls());
+        for body in &self.bodies {
+            if body.actuated {
+                let labels = body.joint.velocity_labels().iter();
+                out.extend(labels.map(|label| match (body.servo, slides(label)) {
+                    (Some(_), true) => "m",
+                    (Some(_), false) => "rad",
+                    (None, true) => "N",
+                    (None, false) => "N m",
+                }));
+            }
+            if body.thruster {
+                out.extend(["N", "N", "N", "N m", "N m", "N m"]);
+            }
+        }
+        let named = |name: &String| self.bodies.iter().find(|body| body.name == *name);
+        let turns = |body: &Body| !body.joint.velocity_labels().iter().all(|x| slides(x));
+        out.extend(self.thrusters().map(
+            |(_, _, thruster)| match thruster.rotor.as_ref().map(named) {
+                Some(rotor) if rotor.is_none_or(turns) => "rad/s",
+                Some(_) => "m/s",
+                None if thruster.polynomial.is_empty() && thruster.table.is_empty() => "N",
+                None => "1",
+            },
+        ));
+        out.extend(self.tendons().map(|(_, _, tendon)| match tendon.gain {
+            1.0 => "m",
+            _ => "1",
+        }));
         out
     }
 
@@ -100,4 +139,9 @@ impl Scene {
         })
         .collect()
     }
+}
+
+/// Whether a velocity of this name is one of a length: others turn.
+fn slides(label: &str) -> bool {
+    label.starts_with('v')
 }

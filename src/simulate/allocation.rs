@@ -42,4 +42,9 @@ impl Simulator {
     pub fn control_names(&self) -> Vec<String> {
         self.scene.control_labels()
     }
+
+    /// Units of the controls, in order ([`crate::Scene::control_units`]).
+    pub fn control_units(&self) -> Vec<&'static str> {
+        self.scene.control_units()
+    }
 }

@@ -1,9 +1,10 @@
 //! What a user may choose about the comparison.
 
 use crate::dynamics::Integrator;
-use crate::simulate::{Fidelity, Method};
+use crate::simulate::{Fidelity, Knob, Method};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use strum::VariantArray;
 
 /// What is varied, and how long it may take. Of each list that isn't empty, the first value is what all else is varied
 /// around; what an empty one stands for is said with it.
@@ -61,6 +62,29 @@ impl TradeoffSettings {
             if let Some(x) = values.into_iter().find(|x| !(*x > 0.0 && *x < below)) {
                 let place = format!("tradeoff settings: {name}");
                 return Err(Error::input(place, x, expected));
+            }
+        }
+        let varied = [
+            ("ranks", self.ranks.is_empty(), Knob::Rank),
+            ("accuracies", self.accuracies.is_empty(), Knob::Accuracy),
+            ("tolerances", self.tolerances.is_empty(), Knob::Tolerance),
+        ];
+        for (name, none, knob) in varied {
+            let has = |fidelity: &Fidelity| fidelity.kind().knobs().contains(&knob);
+            let own = &self.fidelities;
+            if !none && !own.is_empty() && !own.iter().any(has) {
+                let place = format!("tradeoff settings: {name}");
+                let given: Vec<_> = own.iter().map(Fidelity::to_string).collect();
+                let others: Vec<_> = Fidelity::VARIANTS.iter().filter(|f| has(f)).collect();
+                let others: Vec<_> = others.into_iter().map(Fidelity::to_string).collect();
+                return Err(Error::input(
+                    place,
+                    format!("some, with the fidelities {}", given.join(", ")),
+                    format!(
+                        "are those of {}: add it to the fidelities",
+                        others.join(", ")
+                    ),
+                ));
             }
         }
         Ok(())

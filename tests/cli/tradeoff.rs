@@ -226,6 +226,16 @@ fn fronts_are_right(report: &Value) {
 }
 
 #[test]
+fn what_no_fidelity_takes_is_refused() {
+    let words = ["tolerances", "reduced", "full"];
+    let cube = scene("cube");
+    let given = [&cube[..], "--fidelities", "reduced", "--tolerances", "1e-3"];
+    fails(&given, 1, &words);
+    let given = [&cube[..], "--fidelities", "full", "--ranks", "20"];
+    fails(&given, 1, &["ranks", "full", "reduced"]);
+}
+
+#[test]
 fn what_the_budget_has_no_time_for_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("nothing.svg");

@@ -3,7 +3,8 @@
 use crate::support::says;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{
-    Body, Controller, Damping, Edge, Fin, Fluid, Force, Joint, Scene, Shape, Spring, Thruster,
+    Body, Controller, Damping, Edge, Fin, Fluid, Force, Joint, Scene, Servo, Shape, Spring, Tendon,
+    Thruster,
 };
 use hydrograd::simulate::Sample;
 use hydrograd::simulate::gradcheck::{self, gradcheck};
@@ -175,7 +176,69 @@ fn a_vehicle_with_everything_has_its_gradients() {
         sim.control_names(),
         ["rudder.force.rate", "jet", "thruster 3"]
     );
+    // Those of the jet's polynomial and of the table are no newtons.
+    assert_eq!(sim.control_units(), ["N m", "1", "1"]);
     gradients(&scene);
+}
+
+/// Controls of all kinds, with their units.
+#[test]
+fn controls_have_names_and_units() {
+    let mut scene = Scene::new(Fluid::fresh_water());
+    let body = |name: &str| {
+        Body::new(Shape::sphere(0.1).faces(20))
+            .named(name)
+            .density(1000.0)
+    };
+    let axis = [0.0, 0.0, 1.0];
+    let (turns, slides) = (Joint::Revolute { axis }, Joint::Prismatic { axis });
+    let servo = Servo::new(10.0, 1.0);
+    scene.add(body("hull").thruster());
+    scene.add(body("arm").joint(turns.clone()).actuated().servo(servo));
+    scene.add(body("rail").joint(slides.clone()).actuated().servo(servo));
+    scene.add(body("cart").joint(slides.clone()).actuated());
+    scene.add(body("screw").joint(turns.clone()).child_of("hull"));
+    scene.add(body("tail").joint(turns));
+    scene.add(body("slide").joint(slides));
+    let jet = || Thruster::new("hull").direction([1.0, 0.0, 0.0]);
+    scene.add_force(jet().named("plain").into());
+    scene.add_force(jet().named("square").polynomial([0.0, 2.0]).into());
+    scene.add_force(jet().named("spun").rotor("screw", 0.1).into());
+    scene.add_force(
+        Tendon::new([("tail", 0.04)])
+            .named("rope")
+            .stiffness(9.0)
+            .into(),
+    );
+    let crank = Tendon::new([("slide", 1.0)]).named("crank");
+    scene.add_force(crank.stiffness(9.0).gain(0.1).into());
+    let found: Vec<_> = scene
+        .control_labels()
+        .into_iter()
+        .zip(scene.control_units())
+        .collect();
+    let found: Vec<_> = found
+        .iter()
+        .map(|(name, unit)| (&name[..], *unit))
+        .collect();
+    let wrench = ["fx", "fy", "fz", "mx", "my", "mz"].map(|x| format!("hull.wrench.{x}"));
+    for (k, name) in wrench.iter().enumerate() {
+        assert_eq!(found[k], (&name[..], if k < 3 { "N" } else { "N m" }));
+    }
+    assert_eq!(
+        found[6..],
+        [
+            ("arm.target.angle", "rad"),
+            ("rail.target.position", "m"),
+            ("cart.force.velocity", "N"),
+            ("plain", "N"),
+            ("square", "1"),
+            ("spun", "rad/s"),
+            ("rope", "m"),
+            ("crank", "1"),
+        ]
+    );
+    assert_eq!(scene.controls(), found.len());
 }
 
 /// Along one axis, in a current: m v̇ = −d (v − U), and m v̇ = −c |v − U| (v − U).

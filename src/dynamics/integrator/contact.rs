@@ -10,7 +10,9 @@
 //! # References
 //! A. Castro et al., "An Unconstrained Convex Formulation of Compliant Contact", 2022.
 
+use super::frozen;
 use super::hessian::Hessian;
+use super::line::{Step, Trial, search};
 use super::reaction::{Reaction, Resisting};
 use super::split::share;
 use super::start::Start;
@@ -21,7 +23,6 @@ use crate::dynamics::tied::Places;
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use std::cell::Cell;
-use std::iter::repeat;
 
 /// Most Newton iterations.
 const ITERATIONS: usize = 200;
@@ -29,36 +30,13 @@ const ITERATIONS: usize = 200;
 const RESIDUAL: f64 = 1e-12;
 /// What is accepted at the last iteration.
 const ENOUGH: f64 = 1e-9;
-/// Evaluations of a search along a step.
-const TRIALS: usize = 60;
-/// Part of the slope at its start that a search may leave.
-const LEFT: f64 = 0.3;
+/// Imbalance above which a step solved by products looks ahead ([`frozen`]), and the relative residual that it is solved to then.
+const FAR: f64 = 0.05;
+const AHEAD: f64 = 1e-3;
 /// Coarsest relative residual of a step that is solved for by products.
 const COARSE: f64 = 1e-2;
 /// Of [`RESIDUAL`], what such a step leaves at the finest.
 const FINE: f64 = 0.3;
-
-/// A velocity with its imbalance M (v − v*) − Δt g.
-struct Trial {
-    v: DVector<f64>,
-    /// M (v − v*).
-    moved: DVector<f64>,
-    /// What the water's own equations lack of that where M v is a solve of theirs, in units of about the root of an energy; else nothing.
-    behind: Vec<f64>,
-    imbalance: DVector<f64>,
-    /// Whether more than of the balance itself.
-    lacks: bool,
-    residual: f64,
-}
-
-/// A step of the search.
-struct Step {
-    v: DVector<f64>,
-    /// Its product with M, where that isn't found by multiplying.
-    moved: Option<DVector<f64>>,
-    /// What it leaves of the water's own equations.
-    left: Vec<f64>,
-}
 
 /// The velocity after contact that acts for `dt` (s), from the one before it; the same bits where nothing presses.
 pub(super) fn solve(
@@ -118,7 +96,8 @@ pub(super) fn solve_pushed(
         }
     };
     let mut now = at(guess.clone(), None, Vec::new());
-    let (mut previous, mut places) = (f64::INFINITY, Places::default());
+    let (mut previous, mut looked) = (f64::INFINITY, false);
+    let mut places = Places::default();
     for iteration in 0..ITERATIONS {
         let stalled = now.residual >= 0.25 * previous;
         let converged =
@@ -130,21 +109,55 @@ pub(super) fn solve_pushed(
         if !now.residual.is_finite() {
             break;
         }
-        // As the search comes nearer (S. C. Eisenstat, H. F. Walker, "Choosing the Forcing Terms in an Inexact Newton Method", 1996).
-        let forced = match previous.is_finite() {
-            true => (now.residual / previous).powi(2),
-            false => COARSE,
+        let looks = by_products && now.residual > FAR;
+        let forced = match (looks, previous.is_finite() && !looked) {
+            (true, _) => AHEAD,
+            // What was come nearer by looking ahead says nothing of the next step.
+            (false, false) => COARSE,
+            // As the search comes nearer (S. C. Eisenstat, H. F. Walker, "Choosing the Forcing Terms in an Inexact Newton Method", 1996).
+            (false, true) => (now.residual / previous).powi(2),
         };
         let goal = forced.max(FINE * RESIDUAL / now.residual).min(COARSE);
+        looked = looks;
         previous = now.residual;
-        let hessian = Hessian::new(e, split, &reaction, &now.v, dt, &mut places)?;
-        let (step, left) = hessian.step(&split.take(&now.imbalance), &now.behind, goal);
-        let v = split.put(&step);
-        let sizes = [before, &(&now.v - &v)].map(|v| hessian.size(v));
-        in_water.set(sizes.into_iter().fold(in_water.get(), f64::max));
-        // Where a product with M is a solve it follows from that of the step, (M − Δt ∂g/∂v) s being the imbalance.
-        let moved = by_products.then(|| &now.imbalance + dt * reaction.force_jvp(&now.v, &v));
-        now = search(now, &Step { v, moved, left }, &at);
+        let mut hessian = |v: &DVector<f64>| Hessian::new(e, split, &reaction, v, dt, &mut places);
+        let seen = match looks {
+            true => Some(frozen::solve(
+                &now,
+                &mut hessian,
+                (split, &reaction, dt),
+                &at,
+            )?),
+            false => None,
+        };
+        let mut step = |seen: Option<&DVector<f64>>| -> Result<Step> {
+            let v = seen.unwrap_or(&now.v);
+            let hessian = hessian(v)?;
+            // The imbalance, with forces that are linear about what is seen ahead.
+            let right = match seen {
+                None => now.imbalance.clone(),
+                Some(v) => {
+                    let force = reaction.force(v, Dual::User);
+                    &now.moved - push - dt * (force + reaction.force_jvp(v, &(&now.v - v)))
+                }
+            };
+            let (step, left) = hessian.step(&split.take(&right), &now.behind, goal);
+            let step = split.put(&step);
+            let sizes = [before, &(&now.v - &step)].map(|v| hessian.size(v));
+            in_water.set(sizes.into_iter().fold(in_water.get(), f64::max));
+            // Where a product with M is a solve it follows from that of the step, (M − Δt ∂g/∂v) s being the imbalance.
+            let moved = by_products.then(|| right + dt * reaction.force_jvp(v, &step));
+            Ok(Step {
+                v: step,
+                moved,
+                left,
+            })
+        };
+        let mut next = step(seen.as_ref())?;
+        if seen.is_some() && now.imbalance.dot(&next.v) <= 0.0 {
+            next = step(None)?;
+        }
+        now = search(&now, &next, &at);
     }
     Err(Error::Solver {
         what: start.stage_name(),
@@ -154,48 +167,6 @@ pub(super) fn solve_pushed(
         remedy: "contact doesn't converge: take a smaller time step, or smaller contact.stiffness, contact.friction and limit_stiffness"
             .into(),
     })
-}
-
-/// Along Newton's step: the full one, or where that runs past the least value on its way, about there (regula falsi on the
-/// slope, in halves where it creeps). Short of it won't do: where the slope turns steeply, regula falsi's first guess is hardly a step.
-fn search(
-    now: Trial,
-    step: &Step,
-    at: &dyn Fn(DVector<f64>, Option<DVector<f64>>, Vec<f64>) -> Trial,
-) -> Trial {
-    let after = |length: f64| {
-        let moved = (step.moved.as_ref()).map(|moved| &now.moved - length * moved);
-        // Lacking nothing is the same as zeros.
-        let lacked = now.behind.iter().copied().chain(repeat(0.0));
-        let behind = (step.left.iter().zip(lacked))
-            .map(|(left, lacked)| (1.0 - length) * lacked + length * left);
-        at(&now.v - length * &step.v, moved, behind.collect())
-    };
-    let slope = |t: &Trial| t.imbalance.dot(&step.v);
-    let start = slope(&now);
-    let mut best = after(1.0);
-    let (mut low, mut high) = ((0.0, start), (1.0, slope(&best)));
-    // Where more is left of the water's equations than of the balance, the slope tells nothing.
-    if now.lacks || high.1 >= -LEFT * start || start.is_nan() || start <= 0.0 {
-        return best;
-    }
-    for trial in 0..TRIALS {
-        let length = match trial % 2 {
-            0 => (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1),
-            _ => 0.5 * (low.0 + high.0),
-        };
-        let next = after(length);
-        let there = slope(&next);
-        match there < 0.0 {
-            true => high = (length, there),
-            false => low = (length, there),
-        }
-        best = next;
-        if there.abs() <= LEFT * start {
-            break;
-        }
-    }
-    best
 }
 
 /// The frame momenta `hat` with what contact adds in a step, from the velocities before and after it.

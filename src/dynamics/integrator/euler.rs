@@ -15,7 +15,7 @@ use super::end_contact;
 use super::energy::{self, Closure};
 use super::hold::Hold;
 use super::plan::Halt;
-use super::quasi::{self, Trial};
+use super::quasi::{self, Descended, Trial};
 use super::rule::Rule;
 use super::split::share;
 use super::stage_adjoint::AdjointStage;
@@ -37,6 +37,8 @@ const ENOUGH: f64 = 1e-11;
 const ROUNDED: f64 = 1e-13;
 /// Distance from the world's origin, m, from which on its moments hide those of bodies of a metre or less: their part of them falls with its square.
 const FAR: f64 = 1e3;
+/// Part of the residual that a descent which ends short of the solution may leave.
+const NEARER: f64 = 0.5;
 /// Shortest part of Newton's step.
 const SHORTEST: f64 = 1.0 / 4096.0;
 
@@ -185,19 +187,24 @@ pub(super) fn solve_stage<'a>(
             break;
         }
         previous = residual;
-        let factor = if iteration == 0 {
-            let factor = equation.first_factor(&now)?;
+        let factor = match iteration {
+            0 => equation.first_factor(&now)?,
+            _ => equation.factor(&now)?,
+        };
+        // Newton's method is none where the matrix lacks how forces of what bodies exchange change.
+        let lacks = e.scattered().is_some();
+        if let Some(factor) = factor.as_ref().filter(|_| iteration == 0 || lacks) {
             let (weight, at) = (equation.weight(), |v| equation.at(v));
             let ends = (|now: &Trial| equation.is_noise(now), quasi::solved(e));
-            let found = (factor.as_ref())
-                .and_then(|factor| quasi::descend(split, &weight, factor, &now, ends, at));
-            if let Some(found) = found {
-                return Ok(found.into());
+            match quasi::descend(split, &weight, factor, &now, ends, at) {
+                Descended::Solved(found) => return Ok(found.into()),
+                Descended::Nearer(found) if lacks && found.residual <= NEARER * residual => {
+                    now = found;
+                    continue;
+                }
+                _ => {}
             }
-            factor
-        } else {
-            equation.factor(&now)?
-        };
+        }
         let step = factor.and_then(|factor| factor.solve(&split.take(&now.defect), Some(&now.v)));
         let Some(step) = step else {
             break;

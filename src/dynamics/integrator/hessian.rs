@@ -86,6 +86,14 @@ impl<'a> Hessian<'a> {
         }
     }
 
+    /// The same where what the bodies exchange stays as it is.
+    pub fn alone(&self, b: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Self::Alone(factor) => factor.solve(b),
+            Self::Recoiling(many, split) => split.take(&many.alone(&split.put(b))),
+        }
+    }
+
     /// Of a velocity, for what steps leave; zero where they leave nothing.
     pub fn size(&self, v: &DVector<f64>) -> f64 {
         match self {

@@ -14,7 +14,7 @@
 use super::euler::{self, Equation, noise, solve_stage};
 use super::middle_contact;
 use super::plan::Halt;
-use super::quasi;
+use super::quasi::{self, Descended};
 use super::rule::Rule;
 use super::stage_adjoint::{AdjointStage, krylov, solve_columns};
 use super::stages::{ContactVelocities, Stages, StepDerivatives};
@@ -144,8 +144,12 @@ fn at_once(
     };
     let is_noise = |now: &quasi::Trial| now.residual <= noise(&m) || equation.is_noise(now);
     let (weight, ends) = (equation.weight(), (is_noise, quasi::solved(&m)));
-    let found = quasi::descend(split, &weight, &factor, &first, ends, at);
-    Ok(found)
+    Ok(
+        match quasi::descend(split, &weight, &factor, &first, ends, at) {
+            Descended::Solved(found) => Some(found),
+            _ => None,
+        },
+    )
 }
 
 /// What the derivatives of a step need.

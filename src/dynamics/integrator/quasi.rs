@@ -48,7 +48,17 @@ pub(super) fn solved(e: &Linearisation) -> f64 {
     }
 }
 
-/// The solution from `first` on, `factor` being that of the stage's matrix about there, and `weight` the inertia of each free velocity; none where each step doesn't come much nearer, but for trials of which `is_noise` says that
+/// Where a descent gets to.
+pub(super) enum Descended {
+    /// The solution.
+    Solved(Trial),
+    /// Nearer to it, but no longer fast.
+    Nearer(Trial),
+    /// Nowhere.
+    Nowhere,
+}
+
+/// Towards the solution from `first` on, `factor` being that of the stage's matrix about there, and `weight` the inertia of each free velocity, as long as each step comes much nearer, but for trials of which `is_noise` says that
 /// nothing more can be told; residuals up to `solved` end it at once.
 pub(super) fn descend(
     split: &Split,
@@ -57,24 +67,37 @@ pub(super) fn descend(
     first: &Trial,
     (is_noise, solved): (impl Fn(&Trial) -> bool, f64),
     at: impl Fn(DVector<f64>) -> crate::Result<Trial>,
-) -> Option<Trial> {
+) -> Descended {
+    let Some(mut back) = factor.solve(&split.take(&first.defect), Some(&first.v)) else {
+        return Descended::Nowhere;
+    };
     // Steps made, each with its dual by the inertia.
     let mut made: Vec<[DVector<f64>; 2]> = Vec::new();
     let mut improved: Vec<DVector<f64>> = Vec::new();
-    let mut back = factor.solve(&split.take(&first.defect), Some(&first.v))?;
-    let (mut v, mut previous) = (first.v.clone(), first.residual);
+    let mut nearest: Option<Trial> = None;
     for _ in 0..STEPS {
         let step = -&back;
-        let now = at(&v + split.put(&step)).ok()?;
-        let nearer = now.residual <= LEFT * previous;
-        if now.residual <= solved || now.converged(previous) || (!nearer && is_noise(&now)) {
-            return Some(now);
+        let from = nearest.as_ref().unwrap_or(first);
+        let Ok(now) = at(&from.v + split.put(&step)) else {
+            break;
+        };
+        let fast = now.residual <= LEFT * from.residual;
+        if now.residual <= solved || now.converged(from.residual) || (!fast && is_noise(&now)) {
+            return Descended::Solved(now);
         }
-        if !nearer {
-            return None;
+        if !fast {
+            if now.residual < from.residual {
+                nearest = Some(now);
+            }
+            break;
         }
+        let next = factor.solve(&split.take(&now.defect), Some(&now.v));
+        let now = nearest.insert(now);
+        let Some(next) = next else {
+            break;
+        };
+        back = next;
         let dual = step.component_mul(weight);
-        back = factor.solve(&split.take(&now.defect), Some(&now.v))?;
         for ([_, dual], u) in made.iter().zip(&improved) {
             let part = dual.dot(&back);
             back += part * u;
@@ -83,12 +106,14 @@ pub(super) fn descend(
         let (size, ahead) = (dual.dot(&step), dual.dot(&step) + dual.dot(&back));
         let sound = ahead > LEFT * size;
         if !sound {
-            return is_noise(&now).then_some(now);
+            if is_noise(now) {
+                return nearest.map_or(Descended::Nowhere, Descended::Solved);
+            }
+            break;
         }
         improved.push(-&back / ahead);
         back *= size / ahead;
         made.push([step, dual]);
-        (v, previous) = (now.v, now.residual);
     }
-    None
+    nearest.map_or(Descended::Nowhere, Descended::Nearer)
 }

@@ -34,10 +34,16 @@ pub(super) fn frame(rollout: &Rollout, drawn: &Streamlines, n: usize) -> Result<
         let vectors = lines.iter().flat_map(of);
         vectors.flat_map(|x| [x.x, x.y, x.z]).collect()
     };
-    let points = all(|line| &line.points);
+    let mut points = all(|line| &line.points);
+    let mut velocities = all(|line| &line.velocities);
+    let connectivity = (0..points.len() as u64 / 3).collect();
+    // The format's readers want a point: it is on no line.
+    if points.is_empty() {
+        points.extend(seeds.first().map_or([0.0; 3], |x| [x.x, x.y, x.z]));
+        velocities.extend([f64::NAN; 3]);
+    }
     let mut data = Attributes::new();
-    data.point
-        .push(array("velocity", 3, all(|line| &line.velocities)));
+    data.point.push(array("velocity", 3, velocities));
     data.cell.push(array("seed", 1, numbers));
     let mut end = 0;
     let offsets = lines.iter().map(|line| {
@@ -47,7 +53,7 @@ pub(super) fn frame(rollout: &Rollout, drawn: &Streamlines, n: usize) -> Result<
     Ok(DataSet::inline(PolyDataPiece {
         lines: Some(VertexNumbers::XML {
             offsets: offsets.collect(),
-            connectivity: (0..points.len() as u64 / 3).collect(),
+            connectivity,
         }),
         points: points.into(),
         data,

@@ -1,6 +1,6 @@
 //! Files within files: what they hold takes the place of the element that includes them.
 
-use super::super::file::{DEEPEST, document};
+use super::super::file::{DEEPEST, document, too_deep};
 use super::element::Element;
 use crate::{Error, Result};
 use roxmltree::{Document, Node};
@@ -56,7 +56,7 @@ impl Includes {
             line,
         };
         if depth > DEEPEST {
-            return Err(made.wrong(format!("elements are nested over {DEEPEST} deep")));
+            return Err(made.wrong(too_deep()));
         }
         made.children = self.children(node, file, depth)?;
         Ok(made)

@@ -206,6 +206,7 @@ def test_wrong_input():
         ({"render_mode": "human"}, "render_mode: got 'human'"),
         ({"fidelity": "most"}, "fidelity: got 'most'; must be one of"),
         ({"simulator": environments.SwimmerEnv().simulator}, "simulator: got one with the coordinates"),
+        ({"simulator": 3}, "simulator: got 3; must be a hydrograd.Simulator"),
     ):
         with pytest.raises(hg.InputError, match=says):
             environments.GraspEnv(**settings)

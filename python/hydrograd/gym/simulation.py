@@ -60,6 +60,8 @@ class SimulationEnv(gymnasium.Env[_Array, NDArray[np.float32]]):
             )
         self._largest = np.asarray(largest, dtype=float)
         if simulator is not None:
+            if not isinstance(simulator, hg.Simulator):
+                raise hg.InputError(f"simulator: got {simulator!r}; must be a hydrograd.Simulator, or None")
             size = self._largest.size
             if simulator.q_names != list(coordinates) or simulator.control_size != size:
                 raise hg.InputError(

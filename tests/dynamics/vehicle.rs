@@ -194,10 +194,10 @@ fn controls_have_names_and_units() {
     let (turns, slides) = (Joint::Revolute { axis }, Joint::Prismatic { axis });
     let servo = Servo::new(10.0, 1.0);
     scene.add(body("hull").thruster());
-    scene.add(body("arm").joint(turns.clone()).actuated().servo(servo));
-    scene.add(body("rail").joint(slides.clone()).actuated().servo(servo));
-    scene.add(body("cart").joint(slides.clone()).actuated());
-    scene.add(body("screw").joint(turns.clone()).child_of("hull"));
+    scene.add(body("arm").joint(turns).actuated().servo(servo));
+    scene.add(body("rail").joint(slides).actuated().servo(servo));
+    scene.add(body("cart").joint(slides).actuated());
+    scene.add(body("screw").joint(turns).child_of("hull"));
     scene.add(body("tail").joint(turns));
     scene.add(body("slide").joint(slides));
     let jet = || Thruster::new("hull").direction([1.0, 0.0, 0.0]);

@@ -99,6 +99,25 @@ pub struct Gaps {
     longest: f64,
 }
 
+/// What finds distances from each mesh; equal ones share theirs, which of many bodies would be a third of all memory.
+fn trees(meshes: &[Option<&TriMesh>]) -> Vec<Option<Arc<MeshTree>>> {
+    let mut made: Vec<(&TriMesh, Arc<MeshTree>)> = Vec::new();
+    let mut out = Vec::with_capacity(meshes.len());
+    for mesh in meshes {
+        out.push(mesh.map(|mesh| {
+            let equal =
+                |of: &TriMesh| of.vertices() == mesh.vertices() && of.faces() == mesh.faces();
+            if let Some((_, known)) = made.iter().find(|(of, _)| equal(of)) {
+                return known.clone();
+            }
+            let tree = Arc::new(MeshTree::new(mesh));
+            made.push((mesh, tree.clone()));
+            tree
+        }));
+    }
+    out
+}
+
 impl Gaps {
     /// `meshes` in body frames, none for a body without surface. Pairs of bodies in `ignore`,
     /// in either order, are left out: those that never move relative to one another.
@@ -118,8 +137,7 @@ impl Gaps {
                 format!("bodies are counted from 0 and there are {count}"),
             ));
         }
-        let tree = |mesh: &Option<&TriMesh>| Some(Arc::new(MeshTree::new((*mesh)?)));
-        let trees: Vec<_> = meshes.iter().map(tree).collect();
+        let trees = trees(meshes);
         let longest = trees.iter().flatten().map(|t| t.longest_edge());
         Ok(Self {
             longest: longest.fold(0.0, f64::max),
@@ -423,5 +441,26 @@ impl Share {
     /// Whether a point lies in the larger body, in its frame.
     fn holds(&self, x: &Vec3) -> bool {
         self.tree.depth_above(x, 0.0).is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Gaps, TriMesh};
+    use crate::geometry::tests::cuboid;
+    use std::sync::Arc;
+
+    #[test]
+    fn equal_meshes_share_a_tree() {
+        let cube = cuboid([0.1; 3]);
+        let other =
+            TriMesh::new("another", cube.vertices().to_vec(), cube.faces().to_vec()).unwrap();
+        let larger = cuboid([0.1, 0.1, 0.2]);
+        let meshes = [Some(&cube), None, Some(&larger), Some(&other)];
+        let trees = Gaps::new(&meshes, &[], &[]).unwrap().trees;
+        let [Some(first), None, Some(second), Some(third)] = &trees[..] else {
+            panic!("a tree of each mesh");
+        };
+        assert!(Arc::ptr_eq(first, third) && !Arc::ptr_eq(first, second));
     }
 }

@@ -444,8 +444,8 @@ fn measure(
     for i in [1, 2, 0, 3, 4, 5] {
         let h = step_sizes[i];
         // Shorter ones serve where a kink is at the start, as of a drag of |v| v at rest: there differences are off by h itself.
-        let last = i.checked_sub(1).map(|last| rel_errors[last]);
-        if i > USUAL && last.is_none_or(|last| !rel_errors[..i].iter().all(|e| *e >= last)) {
+        let falls = |i: usize| rel_errors[..i - 1].iter().all(|e| rel_errors[i - 1] < *e);
+        if i > USUAL && !falls(i) {
             break;
         }
         // Fourth order: at 1e-3 its own error is far under rounding.

@@ -64,29 +64,33 @@ impl TradeoffSettings {
                 return Err(Error::input(place, x, expected));
             }
         }
+        let own = &self.fidelities;
         let varied = [
-            ("ranks", self.ranks.is_empty(), Knob::Rank),
-            ("accuracies", self.accuracies.is_empty(), Knob::Accuracy),
-            ("tolerances", self.tolerances.is_empty(), Knob::Tolerance),
+            ("ranks", self.ranks.len(), Knob::Rank),
+            ("accuracies", self.accuracies.len(), Knob::Accuracy),
+            ("tolerances", self.tolerances.len(), Knob::Tolerance),
         ];
-        for (name, none, knob) in varied {
-            let has = |fidelity: &Fidelity| fidelity.kind().knobs().contains(&knob);
-            let own = &self.fidelities;
-            if !none && !own.is_empty() && !own.iter().any(has) {
-                let place = format!("tradeoff settings: {name}");
-                let given: Vec<_> = own.iter().map(Fidelity::to_string).collect();
-                let others: Vec<_> = Fidelity::VARIANTS.iter().filter(|f| has(f)).collect();
-                let others: Vec<_> = others.into_iter().map(Fidelity::to_string).collect();
-                return Err(Error::input(
-                    place,
-                    format!("some, with the fidelities {}", given.join(", ")),
-                    format!(
-                        "are those of {}: add it to the fidelities",
-                        others.join(", ")
-                    ),
-                ));
+        for (name, count, knob) in varied {
+            let has = |fidelity: &&Fidelity| fidelity.kind().knobs().contains(&knob);
+            if count == 0 || own.is_empty() || own.iter().any(|fidelity| has(&fidelity)) {
+                continue;
             }
+            return Err(Error::input(
+                format!("tradeoff settings: {name}"),
+                format!("{count} with the fidelities {}", names(own.iter())),
+                format!(
+                    "must be left out, or one of {} be among the fidelities",
+                    names(Fidelity::VARIANTS.iter().filter(has))
+                ),
+            ));
         }
         Ok(())
     }
+}
+
+fn names<'f>(fidelities: impl Iterator<Item = &'f Fidelity>) -> String {
+    fidelities
+        .map(Fidelity::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
 }

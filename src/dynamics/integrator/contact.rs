@@ -121,15 +121,8 @@ pub(super) fn solve_pushed(
         looked = looks;
         previous = now.residual;
         let mut hessian = |v: &DVector<f64>| Hessian::new(e, split, &reaction, v, dt, &mut places);
-        let seen = match looks {
-            true => Some(frozen::solve(
-                &now,
-                &mut hessian,
-                (split, &reaction, dt),
-                &at,
-            )?),
-            false => None,
-        };
+        let ahead = || frozen::solve(&now, &mut hessian, (split, &reaction, dt), &at);
+        let seen = looks.then(ahead).transpose()?;
         let mut step = |seen: Option<&DVector<f64>>| -> Result<Step> {
             let v = seen.unwrap_or(&now.v);
             let hessian = hessian(v)?;
@@ -154,6 +147,7 @@ pub(super) fn solve_pushed(
             })
         };
         let mut next = step(seen.as_ref())?;
+        // Up the energy, as it may be where the exchange decides what presses: as without looking.
         if seen.is_some() && now.imbalance.dot(&next.v) <= 0.0 {
             next = step(None)?;
         }

@@ -1,7 +1,7 @@
 //! How the cost of a step grows with the bodies: where all feel each other, by products and by the factor; and where none feels another (`isolated`), free ones, and one chain of
 //! revolute joints, as a ratio to 25 bodies in the same run.
 //!
-//! `cargo bench --bench bodies [-- coupled|isolated] [spheres] [ellipsoids] [fish] [gpu] [MOST]`, MOST the largest number of bodies that feel each other (4096), `gpu` (with the feature of that name) with sums on a device; `-- errors [N]` compares N random configurations (100) with the
+//! `cargo bench --bench bodies [-- coupled|isolated] [spheres] [ellipsoids] [boxes] [fish] [gpu] [MOST]`, MOST the largest number of bodies that feel each other (4096), `gpu` (with the feature of that name) with sums on a device; `-- errors [N]` compares N random configurations (100) with the
 //! factor. The least of all rounds counts of isolated bodies. Preparing is one body's, whose shape the others share, and the checks of the scene.
 
 mod coupled;
@@ -75,7 +75,7 @@ fn main() -> hydrograd::Result<()> {
     }
     if !asked("isolated") {
         coupled::iterations()?;
-        let kinds = ["spheres", "ellipsoids", "fish"]
+        let kinds = ["spheres", "ellipsoids", "boxes", "fish"]
             .iter()
             .any(|kind| asked(kind));
         coupled::sizes(number.unwrap_or(4096), |kind| !kinds || asked(kind))?;

@@ -1,7 +1,8 @@
 //! The exchange between few numbers of each body, as a solve asks for it again and again at the same places: matrices of near pairs, and moments of each number.
 //!
 //! A body of many points answers with few charges of its own: its modes' and its twist's, [L, Ū] z. Its numbers are z, those of a body that has fewer points its charges. With
-//! P = [L, Ū] or the identity, a near pair's matrix is Pᵀ (1/r) P, weighed, and the moments of a body's numbers are those of P's columns.
+//! P = [L, Ū] or the identity, a near pair's matrix is Pᵀ (1/r) P, weighed, and the moments of a body's numbers are those of P's columns. Few points that stand for a body have charges C P z, which are their own
+//! numbers.
 
 use super::Scattering;
 use super::far::Derivatives;
@@ -15,6 +16,7 @@ use crate::solver::{dot, matmul};
 use faer::prelude::IntoConst;
 use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -53,6 +55,11 @@ struct Room {
 }
 
 impl Scattering {
+    /// Of a body, where a pair's matrix has them.
+    fn numbers_of(&self, near: &Near, b: usize) -> Range<usize> {
+        [&self.numbers, &self.few.numbers][usize::from(near.fewer)][b].clone()
+    }
+
     /// P of a body or of what a mirror shows of it; none that is the identity.
     pub(super) fn carrier(&self, b: usize) -> Option<MatRef<'_, f64>> {
         let body = &self.bodies[b % self.bodies.len()];
@@ -82,12 +89,12 @@ impl Blocks {
         let near = in_parts(all, |_, pairs: &[Near]| {
             let first = pairs.first().map_or(0, |near| near.number);
             let sizes = pairs.iter().map(|near| {
-                let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
+                let [rows, columns] = near.bodies.map(|b| model.numbers_of(near, b).len());
                 rows.next_multiple_of(LANES) * columns
             });
             let (mut out, mut room) = (model.spare.take(sizes.sum()), Room::default());
             for near in pairs {
-                let weight = sums.weights.within(near.within);
+                let weight = sums.weights.of(near.own, near.within);
                 room.matrix(model, sums.places, near, weight, &mut out);
             }
             (first..first + pairs.len(), out)
@@ -135,6 +142,9 @@ impl Blocks {
 
     fn near(&self, sums: &Sums<'_, f64>, numbers: &[f64]) -> Vec<f64> {
         let model = sums.model;
+        let numbers = &*model
+            .few
+            .with_numbers(&model.numbers, Cow::Borrowed(numbers));
         let part = |(pairs, matrices): &(Range<usize>, Vec<f64>)| {
             let mut out = vec![0.0; numbers.len()];
             multipole::vectorized(
@@ -143,7 +153,7 @@ impl Blocks {
                     let mut rest = &matrices[..];
                     let (mut own, mut seen) = (Vec::new(), Vec::new());
                     for near in &sums.pairs.near[pairs.clone()] {
-                        let [a, b] = near.bodies.map(|b| model.numbers[b].clone());
+                        let [a, b] = near.bodies.map(|b| model.numbers_of(near, b));
                         let stride = a.len().next_multiple_of(LANES);
                         let (matrix, after) = rest.split_at(stride * b.len());
                         rest = after;
@@ -184,6 +194,7 @@ impl Blocks {
         for seen in parts {
             out.iter_mut().zip(seen).for_each(|(out, x)| *out += x);
         }
+        model.few.without_numbers(&model.numbers, &mut out);
         out
     }
 }
@@ -198,8 +209,9 @@ impl Room {
         weight: f64,
         out: &mut Vec<f64>,
     ) {
-        let [a, b] = near.bodies.map(|b| model.points[b].clone());
-        let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
+        let points = [&model.points, &model.few.points][usize::from(near.fewer)];
+        let [a, b] = near.bodies.map(|b| points[b].clone());
+        let [rows, columns] = near.bodies.map(|b| model.numbers_of(near, b).len());
         let stride = a.len().next_multiple_of(WIDTH);
         // Beyond the last point it stands again.
         for (own, all) in self.to.iter_mut().zip(&places.points) {
@@ -218,7 +230,11 @@ impl Room {
             },
         );
         let room = rows.next_multiple_of(LANES);
-        let carriers = near.bodies.map(|b| model.carrier(b));
+        // Few points are told by their charges.
+        let carriers = near.bodies.map(|b| match near.fewer {
+            true => None,
+            false => model.carrier(b),
+        });
         let all = &self.inverse[..b.len() * stride];
         let start = out.len();
         out.resize(start + room * columns, 0.0);

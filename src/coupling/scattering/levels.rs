@@ -8,6 +8,21 @@ use crate::{Error, Result};
 const TOLERANCE: f64 = 1e-10;
 /// Of the ratio from which on moments don't stand for points, the part up to which they do so alone.
 const SURE: f64 = 0.9;
+/// Ratio up to which few points stand for a body's own.
+const FEWER: f64 = 0.7;
+/// What these leave of the potential of a body with a unit of energy where it is seen by them, of the accuracy.
+const REST: f64 = 1.0;
+
+/// What two cells are that see each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Of one of them several bodies.
+    Groups,
+    /// Two bodies, by their moments.
+    Bodies,
+    /// Two bodies, by few points.
+    Points,
+}
 
 /// Levels of the exchange between many bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +33,10 @@ pub struct Levels {
     pub bodies: Apart,
     /// From where on those of two cells do, of which one holds several bodies: what is left out differs in sign from body to body.
     pub cells: Apart,
+    /// From where on few points of two bodies stand for all of them.
+    pub fewer: Apart,
+    /// Largest error of the potential from there on that few points make, of a body whose motion has a unit of energy, times the root of its size: none stand for all at zero.
+    pub rest: f64,
     /// Relative residual at which solves end.
     pub tolerance: f64,
 }
@@ -52,29 +71,32 @@ impl Levels {
             degree,
             bodies: apart(bodies),
             cells: apart(cells),
+            fewer: apart(FEWER),
+            rest: REST * accuracy,
             tolerance: TOLERANCE,
         })
     }
 
-    pub(super) fn of(&self, bodies: bool) -> &Apart {
-        match bodies {
-            true => &self.bodies,
-            false => &self.cells,
+    pub(super) fn of(&self, kind: Kind) -> &Apart {
+        match kind {
+            Kind::Groups => &self.cells,
+            Kind::Bodies => &self.bodies,
+            Kind::Points => &self.fewer,
         }
     }
 }
 
-/// Sum of the radii over the distance up to which two cells are seen by their moments alone, and from which on not at all.
+/// Sum of the radii over the distance up to which two cells are seen by their moments alone, or bodies by few points, and from which on not at all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Apart {
-    /// Up to which by moments alone.
+    /// Up to which by these alone.
     pub sure: f64,
     /// From which on not at all.
     pub most: f64,
 }
 
 impl Apart {
-    /// Weight of the moments, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
+    /// Weight of these, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
     pub(super) fn weight<T: Number>(&self, ratio: T) -> [T; 2] {
         let width = self.most - self.sure;
         let [value, slope] = fade((ratio - T::constant(self.sure)) * (1.0 / width));

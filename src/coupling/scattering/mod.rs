@@ -27,6 +27,7 @@ mod blocks;
 mod cells;
 mod elsewhere;
 mod far;
+mod fewer;
 mod kept;
 mod levels;
 mod linearised;
@@ -60,6 +61,7 @@ use crate::adjoint::multipole::{Pack, Table};
 use crate::geometry::Image;
 use crate::{Error, Result};
 use cells::Cells;
+use fewer::Few;
 use spare::Spare;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -79,6 +81,8 @@ pub struct Scattering {
     modes: Vec<Range<usize>>,
     /// Of the few numbers that a body's charges are told by while they are solved for; bodies and what mirrors show.
     numbers: Vec<Range<usize>>,
+    /// What stands for bodies in the middle distance.
+    few: Few,
     /// Largest distance of a body's points from its centre, m; bodies and what mirrors show.
     sizes: Vec<f64>,
     /// By how much each body counts more where all count alike, if they are unlike.
@@ -159,11 +163,14 @@ impl Scattering {
             let centres = centres.iter();
             centres.map(|c| image.linear * c + image.shift)
         });
+        let points = ranges(seen().map(|b| b.points()));
+        let numbers = ranges(seen().map(|b| b.points().min(b.modes() + 6)));
         Ok(Self {
+            few: Few::new(&bodies, &levels, &points, &numbers),
+            points,
+            numbers,
             alone: Isolated::new(bodies.iter().map(|b| b.parts().added_mass).collect()),
-            points: ranges(seen().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
-            numbers: ranges(seen().map(|b| b.points().min(b.modes() + 6))),
             sizes: seen().map(size).collect(),
             unlike: unlike::weights(&bodies),
             cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
@@ -199,6 +206,14 @@ impl Scattering {
     /// The same, with these films in gaps that the points don't resolve.
     pub(crate) fn with_films(mut self, films: Films) -> Self {
         self.films = films;
+        self
+    }
+
+    /// The same, cut into these levels.
+    pub fn with_levels(mut self, levels: Levels) -> Self {
+        self.few = Few::new(&self.bodies, &levels, &self.points, &self.numbers);
+        self.table = Table::new(levels.degree);
+        self.levels = levels;
         self
     }
 

@@ -36,9 +36,9 @@ impl<T: Number> NearPart<T> {
     }
 }
 
-/// The points and their charges.
+/// The points and their charges, those of the few that stand for all after them.
 pub(super) struct Charged<'m, T> {
-    pub points: &'m [Range<usize>],
+    pub points: [&'m [Range<usize>]; 2],
     pub places: &'m Places<T>,
     pub weights: &'m Weights<T>,
     pub charges: &'m [T],
@@ -53,8 +53,10 @@ impl<T: Number> Charged<'_, T> {
                 let mut out = NearPart::zeros(self.charges.len(), forces);
                 let mut other = Vec::new();
                 for near in pairs {
-                    self.load(near.bodies[1], &mut other);
-                    let energy = self.pair(near, forces, &mut other, &mut out);
+                    let [own, others] = near.bodies.map(|b| self.points_of(near, b));
+                    self.load(others, &mut other);
+                    let weight = self.weights.of(near.own, near.within);
+                    let energy = self.pair(own, weight, forces, &mut other, &mut out);
                     if forces {
                         out.energies.push(energy);
                     }
@@ -64,10 +66,15 @@ impl<T: Number> Charged<'_, T> {
         )
     }
 
-    /// The points of a body, eight side by side.
+    /// The points of a body that a pair sees.
+    fn points_of(&self, near: &Near, b: usize) -> Range<usize> {
+        self.points[usize::from(near.fewer)][b].clone()
+    }
+
+    /// Points, eight side by side.
     #[inline(always)]
-    fn load(&self, b: usize, out: &mut Vec<Eight<T::Pack>>) {
-        let (all, none) = (self.points[b].clone(), T::Pack::constant(0.0));
+    fn load(&self, all: Range<usize>, out: &mut Vec<Eight<T::Pack>>) {
+        let none = T::Pack::constant(0.0);
         out.clear();
         let mut first = all.start;
         while first < all.end {
@@ -90,15 +97,15 @@ impl<T: Number> Charged<'_, T> {
     #[inline(always)]
     fn pair(
         &self,
-        near: &Near,
+        points: Range<usize>,
+        weight: T,
         forces: bool,
         other: &mut [Eight<T::Pack>],
         out: &mut NearPart<T>,
     ) -> T {
-        let weight = self.weights.within(near.within);
         let zero = T::Pack::constant(0.0);
         let mut energy = T::constant(0.0);
-        for i in self.points[near.bodies[0]].clone() {
+        for i in points {
             let own = T::pack(&[self.charges[i]; WIDTH]);
             let point = self.places.point(i).map(|x| T::pack(&[x; WIDTH]));
             let (mut seen, mut force) = (zero, [zero; 3]);

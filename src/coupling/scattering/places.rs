@@ -2,6 +2,7 @@
 
 use super::Scattering;
 use super::cells::Cells;
+use super::end;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, point_velocity};
 use crate::adjoint::multipole::{Arithmetic, Number};
 use crate::geometry::Image;
@@ -39,7 +40,7 @@ pub(super) fn add<T: Arithmetic>(out: &mut Triple<T>, factor: T, x: &Triple<T>) 
 
 /// All places in the world.
 pub(super) struct Places<T> {
-    /// Points of all bodies, one body after the other.
+    /// Points of all bodies, one body after the other, and then those that stand for these.
     pub points: [Vec<T>; 3],
     /// Of the cells: the mean of their bodies' centres.
     pub centres: Vec<Triple<T>>,
@@ -76,7 +77,7 @@ impl<T: Number> Places<T> {
         poses: &[Pose],
         of: impl Fn(&Image, usize, Vec3) -> Triple<T>,
     ) -> Self {
-        let count = model.points.last().map_or(0, |last| last.end);
+        let count = end(&model.points).max(end(&model.few.points));
         let mut points = [0; 3].map(|_| Vec::with_capacity(count));
         let mut centres = Vec::with_capacity(model.points.len());
         for image in &model.images {
@@ -90,6 +91,9 @@ impl<T: Number> Places<T> {
                 }
                 centres.push(placed(&parts.centre));
             }
+        }
+        for places in &mut points {
+            model.few.add_places(&model.points, places);
         }
         Self::of(points, &centres, &model.sizes, &model.cells)
     }

@@ -89,7 +89,8 @@ impl Scattering {
         let (pairs, making) = match &self.summing {
             Some(summing) => (Pairs::default(), Made::Elsewhere(summing.place(poses)?)),
             None => {
-                let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
+                let fewer = |pair| self.few.stand_for(pair);
+                let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels, fewer);
                 let blocks = Blocks::new(&Sums::new(self, &pairs, &places));
                 (pairs, Made::Here(blocks))
             }

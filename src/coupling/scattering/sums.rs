@@ -10,6 +10,7 @@ use crate::adjoint::lie::Vec6;
 use crate::adjoint::multipole::{self, Arithmetic, Number, WIDTH};
 use num_dual::Dual64;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -256,8 +257,10 @@ impl<'s, T: Number> Sums<'s, T> {
     }
 
     fn near(&self, charges: &[T], forces: bool) -> NearPart<T> {
+        let Scattering { few, points, .. } = self.model;
+        let charges = &*few.with_charges(points, Cow::Borrowed(charges));
         let charged = Charged {
-            points: &self.model.points,
+            points: [points, &few.points],
             places: self.places,
             weights: &self.weights,
             charges,
@@ -266,6 +269,12 @@ impl<'s, T: Number> Sums<'s, T> {
         let parts = in_parts(&self.pairs.near, part);
         let mut out = NearPart::zeros(charges.len(), forces);
         parts.into_iter().for_each(|part| out.add(part));
+        few.without_charges(points, &mut out.potentials);
+        if forces {
+            for along in &mut out.forces {
+                few.without_places(points, along);
+            }
+        }
         out
     }
 
@@ -378,7 +387,7 @@ impl<'s, T: Number> Sums<'s, T> {
     ) {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let count = self.pairs.blends.len();
-        // Of each blend: its moments' energy, and that of its halves, blends among them.
+        // Of each blend: its moments' energy or that of few points, and that of its halves or of all points, blends among them.
         let (mut own, mut halves) = (vec![zero; count], vec![zero; count]);
         for (pair, (energy, _)) in self.pairs.far.iter().zip(far) {
             match (pair.own, pair.within) {
@@ -388,8 +397,10 @@ impl<'s, T: Number> Sums<'s, T> {
             }
         }
         for (pair, energy) in self.pairs.near.iter().zip(near) {
-            if let Some(w) = pair.within {
-                halves[w] += *energy;
+            match (pair.own, pair.within) {
+                (Some(i), _) => own[i] = *energy,
+                (None, Some(w)) => halves[w] += *energy,
+                (None, None) => {}
             }
         }
         for (i, blend) in self.pairs.blends.iter().enumerate().rev() {

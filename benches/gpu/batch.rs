@@ -54,7 +54,7 @@ fn run_once(simulator: &Simulator, members: &[Member]) -> hydrograd::Result<Run>
     let (made, forward) = simulator.rollout_batch(members, || ControlFlow::Continue(()))?;
     let rollouts: Vec<Rollout> = made.into_iter().filter_map(Result::ok).collect();
     let all: Vec<&Rollout> = rollouts.iter().collect();
-    let (bars, gradient) = simulator.gradient_batch(&all, &goal)?;
+    let (bars, gradient) = simulator.gradient_batch(&all, &goal, || ControlFlow::Continue(()))?;
     let lost = bars.iter().filter(|bar| bar.is_err()).count();
     Ok(Run {
         forward,

@@ -388,19 +388,13 @@ impl Simulator {
         objective: PyRef<'py, Objective>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        use hydrograd::simulate::Objective as _;
         let all: Vec<_> = rollouts.iter().map(|rollout| rollout.shared()).collect();
         let steps = all.iter().map(|rollout| rollout.steps()).sum();
         let (inner, objective) = (self.inner.clone(), objective.0.clone());
         let mut progress = Progress::new("gradient_batch: progress", progress, steps)?;
         let made = followed(py, &mut progress, move |interrupt| {
             let all: Vec<&hydrograd::Rollout> = all.iter().map(Arc::as_ref).collect();
-            let bars = all.iter().map(|rollout| {
-                objective.check(rollout)?;
-                objective.try_cotangents(rollout)
-            });
-            let bars = bars.collect::<hydrograd::Result<Vec<_>>>()?;
-            let (made, _) = inner.vjp_batch(&all, &bars, || interrupt.one_more())?;
+            let (made, _) = inner.gradient_batch(&all, &objective, || interrupt.one_more())?;
             made.into_iter().collect::<hydrograd::Result<Vec<_>>>()
         });
         let made = ended(progress, made)?;

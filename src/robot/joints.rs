@@ -81,7 +81,7 @@ pub(super) fn moves(
         return wrong(
             "axis",
             format!("{axis:?}"),
-            "give a direction, e.g. xyz=\"0 0 1\"".into(),
+            "give a direction that isn't zero, such as 0 0 1".into(),
         );
     }
     let joint = match given.joint_type {

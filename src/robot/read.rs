@@ -324,7 +324,12 @@ impl Look<'_, '_> {
                     1 => "one finite number".into(),
                     _ => format!("{count} finite numbers between blanks"),
                 };
-                let what = format!("<{tag}>: {name} = {value:?} must be {numbers}");
+                let large = found.iter().flatten().any(|x| x.is_finite() && !may(x));
+                let most = match large {
+                    true => format!(" of at most {LARGEST:e}"),
+                    false => String::new(),
+                };
+                let what = format!("<{tag}>: {name} = {value:?} must be {numbers}{most}");
                 Err(self.wrong(node, what))
             }
         }

@@ -268,9 +268,32 @@ fn line_of(before: &[u8]) -> usize {
     before.iter().filter(|&&b| b == b'\n').count() + 1
 }
 
+/// What users of other formats call what a key here has, where another key is nearer by its letters.
+const CALLED: &[(&str, &[&str])] = &[(
+    "placement",
+    &[
+        "position",
+        "pose",
+        "pos",
+        "orientation",
+        "rotation",
+        "xyz",
+        "rpy",
+        "quat",
+        "euler",
+    ],
+)];
+
 fn suggestion(asked: &str, known: &[&str], noun: &str) -> String {
     let list = format!("{noun}: {}", known.join(", "));
-    match nearest(asked, known.iter().copied()) {
+    let called = CALLED
+        .iter()
+        .find(|(key, names)| known.contains(key) && names.contains(&asked));
+    let near = match called {
+        Some((key, _)) => Some(*key),
+        None => nearest(asked, known.iter().copied()),
+    };
+    match near {
         Some(near) => format!("did you mean `{near}`? ({list})"),
         None if known.is_empty() => "remove it; no key but `kind` belongs here".into(),
         None => format!("remove it or use one of the {list}"),

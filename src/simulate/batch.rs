@@ -100,9 +100,20 @@ impl Simulator {
         cotangents: &[Cotangents],
         progress: impl Fn() -> ControlFlow<()> + Sync,
     ) -> Result<(Vec<Result<Gradient>>, BatchReport)> {
+        self.swept("vjp_batch", rollouts, cotangents, progress)
+    }
+
+    /// [`Simulator::vjp_batch`], as `name` for messages.
+    fn swept(
+        &self,
+        name: &str,
+        rollouts: &[&Rollout],
+        cotangents: &[Cotangents],
+        progress: impl Fn() -> ControlFlow<()> + Sync,
+    ) -> Result<(Vec<Result<Gradient>>, BatchReport)> {
         if rollouts.len() != cotangents.len() {
             return Err(Error::input(
-                "vjp_batch: cotangents",
+                format!("{name}: cotangents"),
                 format!("of {} rollouts", cotangents.len()),
                 format!("must be of {}", rollouts.len()),
             ));
@@ -110,7 +121,7 @@ impl Simulator {
         let same = |r: &&&Rollout| Arc::ptr_eq(&r.simulator.assembled, &self.assembled);
         if let Some(other) = rollouts.iter().position(|r| !same(&r)) {
             return Err(Error::input(
-                format!("vjp_batch: rollout {other}"),
+                format!("{name}: rollout {other}"),
                 "one of another simulator",
                 "must be this simulator's, with these parameters",
             ));
@@ -120,7 +131,7 @@ impl Simulator {
         })
     }
 
-    /// [`Rollout::gradient`] of an objective of many rollouts of this simulator.
+    /// [`Rollout::gradient`] of an objective of many rollouts of this simulator, with `progress` as of [`Simulator::vjp_batch`].
     ///
     /// # Errors
     /// As [`Simulator::vjp_batch`], and an objective that doesn't fit the scene.
@@ -128,13 +139,14 @@ impl Simulator {
         &self,
         rollouts: &[&Rollout],
         objective: &(dyn Objective + Sync),
+        progress: impl Fn() -> ControlFlow<()> + Sync,
     ) -> Result<(Vec<Result<Gradient>>, BatchReport)> {
         let bars = rollouts.iter().map(|rollout| {
             objective.check(rollout)?;
             objective.try_cotangents(rollout)
         });
         let bars = bars.collect::<Result<Vec<_>>>()?;
-        self.vjp_batch(rollouts, &bars, || ControlFlow::Continue(()))
+        self.swept("gradient_batch", rollouts, &bars, progress)
     }
 
     /// `work` of so many members, in their order; each gets a simulator whose coupling is computed together with the others', if this one's can be.

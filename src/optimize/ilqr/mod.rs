@@ -2,7 +2,7 @@
 //!
 //! A trajectory is linearised knot by knot (the simulator's own Jacobians of steps, [`Rollout::step_jacobians`], chained over the steps of a knot; the cost by Gauss and Newton), a
 //! sweep from the last knot to the first finds the controls that are best by that model, within their limits (a projected Newton step at each knot), and how they answer to changes
-//! of the state; the simulator then runs with them. A step that doesn't lower the cost as it should is halved; where none does, the model is regularised. Derivatives of second
+//! of the state; the simulator then runs with them. A step that doesn't lower the cost as it should is halved; where none does, or one of an eighth at most, the model is regularised. Derivatives of second
 //! order of the dynamics are left out. States are compared on their manifold (`x ⊖ x̄`): free bodies turn as they like.
 //!
 //! A scene's own controller acts as always; the controls here are the open-loop ones, to which it adds. The numbers don't depend on the number of threads.
@@ -45,6 +45,9 @@ const BESIDE: usize = 3;
 /// The regularisation that follows on none, and its growth.
 const LEAST: f64 = 1e-6;
 const GROWTH: f64 = 10.0;
+/// Part of a step from which on the model is trusted more, and up to which less: one that is cut again and again tells that states turn away from it.
+const TRUSTED: f64 = 0.5;
+const DOUBTED: f64 = 0.125;
 /// Part of the cost below which a fall is rounding.
 const ROUNDING: f64 = 1e-14;
 
@@ -209,9 +212,13 @@ pub(super) fn solve(
             Some((part, next)) => {
                 let fell = run.cost - next.cost;
                 (run, fresh, refused) = (next, false, false);
-                regularisation /= GROWTH;
-                if regularisation < LEAST {
-                    regularisation = 0.0;
+                if part >= TRUSTED {
+                    regularisation /= GROWTH;
+                    if regularisation < LEAST {
+                        regularisation = 0.0;
+                    }
+                } else if part <= DOUBTED {
+                    regularisation = grow(regularisation);
                 }
                 (part, fell)
             }

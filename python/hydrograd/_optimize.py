@@ -110,7 +110,7 @@ class IlqrProgress:
     expected: float
     """Fall of the cost that the model of the iteration expected."""
     part: float
-    """Part of the step that was taken; 0: none, the regularisation grew instead."""
+    """Part of the step that was taken; 0: none. The regularisation grows after none, and after an eighth or less."""
     regularisation: float
     """Regularisation of the iteration."""
     gradient: float

@@ -76,7 +76,7 @@ def test_gradients_of_a_batch_are_those_of_its_rollouts(sim):
         right = rollout.gradient(goal)
         assert np.array_equal(one.controls, right.controls)
         assert np.array_equal(one.initial_v, right.initial_v)
-    with pytest.raises(hg.InputError, match="of another simulator"):
+    with pytest.raises(hg.InputError, match="gradient_batch: rollout 0.*of another simulator"):
         approaching().gradient_batch(rollouts, goal)
 
 

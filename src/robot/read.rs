@@ -326,7 +326,7 @@ impl Look<'_, '_> {
                 };
                 let large = found.iter().flatten().any(|x| x.is_finite() && !may(x));
                 let most = match large {
-                    true => format!(" of at most {LARGEST:e}"),
+                    true => format!(" of at most {LARGEST:e} in size"),
                     false => String::new(),
                 };
                 let what = format!("<{tag}>: {name} = {value:?} must be {numbers}{most}");

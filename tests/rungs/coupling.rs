@@ -219,8 +219,9 @@ pub(super) fn scattering_systems() -> Vec<Scattering> {
     let levels = Levels::for_accuracy(1e-3).unwrap();
     let filmed = film_systems();
     let filmed = (filmed.iter()).filter_map(|s| Scattering::of(s, &poses(), levels).ok());
+    let without = out.len();
     out.extend(filmed);
-    assert!(out.len() > 3, "no film");
+    assert!(out.len() > without, "no film");
     out
 }
 
@@ -245,7 +246,18 @@ fn by_few_points([sure, most]: [f64; 2]) -> Scattering {
         ..Levels::for_accuracy(1e-3).unwrap()
     };
     let names = vec!["a".to_string(), "b".to_string()];
-    Scattering::new(vec![Arc::new(body); 2], names, &poses(), levels).unwrap()
+    let made = Scattering::new(vec![Arc::new(body); 2], names, &poses(), levels).unwrap();
+    let all = Levels {
+        rest: 0.0,
+        ..levels
+    };
+    let momenta = |of: &Scattering| {
+        let basis = DMatrix::identity(12, 12);
+        of.evaluate(&poses(), &basis).unwrap().momenta().clone()
+    };
+    let off = momenta(&made) - momenta(&made.clone().with_levels(all));
+    assert!(off.amax() > 0.0, "no few points");
+    made
 }
 
 /// Two bodies by products over a floor and beside a free surface, who feel each other by their images alone.

@@ -80,6 +80,15 @@ fn unknown_keys_get_line_place_and_nearest_key() {
             ],
         ),
         (
+            in_body("position = [1, 0, 0]"),
+            [
+                "line 9",
+                "body \"ball\" has",
+                "`position`",
+                "did you mean `placement`?",
+            ],
+        ),
+        (
             in_body("placement = { positon = [1, 0, 0] }"),
             [
                 "line 9",

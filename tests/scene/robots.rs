@@ -599,6 +599,10 @@ fn elements_that_can_not_be_are_refused() {
         &["size", "3 finite numbers"],
     );
     refused(
+        &geometry("<box size=\"1 2 1e40\"/>"),
+        &["size", "3 finite numbers", "of at most 1e30 in size"],
+    );
+    refused(
         &geometry("<box size=\"1 2 -3\"/>"),
         &["link \"a\"", "size[2]", "positive"],
     );

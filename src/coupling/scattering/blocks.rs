@@ -16,7 +16,6 @@ use crate::solver::{dot, matmul};
 use faer::prelude::IntoConst;
 use faer::{Accum, MatMut, MatRef};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -55,9 +54,20 @@ struct Room {
 }
 
 impl Scattering {
-    /// Of a body, where a pair's matrix has them.
+    /// A body's points that a pair sees.
+    pub(super) fn points_of(&self, near: &Near, b: usize) -> Range<usize> {
+        match near.fewer {
+            true => self.standing.points[b].clone(),
+            false => self.points[b].clone(),
+        }
+    }
+
+    /// Its numbers, where a pair's matrix has them.
     fn numbers_of(&self, near: &Near, b: usize) -> Range<usize> {
-        [&self.numbers, &self.few.numbers][usize::from(near.fewer)][b].clone()
+        match near.fewer {
+            true => self.standing.numbers[b].clone(),
+            false => self.numbers[b].clone(),
+        }
     }
 
     /// P of a body or of what a mirror shows of it; none that is the identity.
@@ -142,9 +152,7 @@ impl Blocks {
 
     fn near(&self, sums: &Sums<'_, f64>, numbers: &[f64]) -> Vec<f64> {
         let model = sums.model;
-        let numbers = &*model
-            .few
-            .with_numbers(&model.numbers, Cow::Borrowed(numbers));
+        let numbers = &*model.standing.with_numbers(&model.numbers, numbers);
         let part = |(pairs, matrices): &(Range<usize>, Vec<f64>)| {
             let mut out = vec![0.0; numbers.len()];
             multipole::vectorized(
@@ -194,7 +202,7 @@ impl Blocks {
         for seen in parts {
             out.iter_mut().zip(seen).for_each(|(out, x)| *out += x);
         }
-        model.few.without_numbers(&model.numbers, &mut out);
+        model.standing.without_numbers(&model.numbers, &mut out);
         out
     }
 }
@@ -209,8 +217,7 @@ impl Room {
         weight: f64,
         out: &mut Vec<f64>,
     ) {
-        let points = [&model.points, &model.few.points][usize::from(near.fewer)];
-        let [a, b] = near.bodies.map(|b| points[b].clone());
+        let [a, b] = near.bodies.map(|b| model.points_of(near, b));
         let [rows, columns] = near.bodies.map(|b| model.numbers_of(near, b).len());
         let stride = a.len().next_multiple_of(WIDTH);
         // Beyond the last point it stands again.

@@ -4,10 +4,12 @@
 //! all points does, so that energy, forces, momenta and all derivatives are those of one energy.
 
 use super::Levels;
+use super::columns::{combined, products_of};
 use super::end;
+use super::parts::of_each;
 use crate::adjoint::kernel;
 use crate::adjoint::lie::{Vec3, Vec6};
-use crate::adjoint::multipole::{self, Number};
+use crate::adjoint::multipole::Number;
 use crate::coupling::reduced::{FLUX, ReducedBody};
 use crate::solver::{least_squares, pursuit};
 use faer::Mat;
@@ -44,14 +46,14 @@ enum Stands {
 
 /// What stands for each body, and for what mirrors show of it. Points that do follow after all bodies' own in a list of both, the numbers of these after all bodies' own.
 #[derive(Clone)]
-pub(super) struct Few {
+pub(super) struct Standing {
     stands: Vec<Stands>,
     /// Of bodies whose own points do these.
     pub points: Vec<Range<usize>>,
     pub numbers: Vec<Range<usize>>,
 }
 
-impl Few {
+impl Standing {
     /// For bodies whose own points and numbers are these, image after image.
     pub fn new(
         bodies: &[Arc<ReducedBody>],
@@ -104,6 +106,11 @@ impl Few {
         }
     }
 
+    /// How many all points are, those of the few among them.
+    pub fn all_points(&self, own: &[Range<usize>]) -> usize {
+        self.each().fold(end(own), |n, (_, f)| n + f.points.len())
+    }
+
     /// Bodies that fewer points stand for.
     fn each(&self) -> impl Iterator<Item = (usize, &Fewer)> {
         (0..self.points.len()).filter_map(|b| match self.stands(b) {
@@ -126,43 +133,41 @@ impl Few {
     pub fn with_charges<'c, T: Number>(
         &self,
         own: &[Range<usize>],
-        charges: Cow<'c, [T]>,
+        charges: &'c [T],
     ) -> Cow<'c, [T]> {
-        self.with(charges, |b, fewer, all| {
-            combined(&fewer.onto, &all[own[b].clone()])
+        self.with(charges, |b, fewer| {
+            combined(&fewer.onto, &charges[own[b].clone()])
         })
     }
 
     /// Numbers of all bodies, those of the few points after them.
-    pub fn with_numbers<'c>(
-        &self,
-        own: &[Range<usize>],
-        numbers: Cow<'c, [f64]>,
-    ) -> Cow<'c, [f64]> {
-        self.with(numbers, |b, fewer, all| {
-            combined(&fewer.numbers, &all[own[b].clone()])
+    pub fn with_numbers<'c>(&self, own: &[Range<usize>], numbers: &'c [f64]) -> Cow<'c, [f64]> {
+        self.with(numbers, |b, fewer| {
+            combined(&fewer.numbers, &numbers[own[b].clone()])
         })
     }
 
     fn with<'c, T: Number>(
         &self,
-        all: Cow<'c, [T]>,
-        further: impl Fn(usize, &Fewer, &[T]) -> Vec<T>,
+        all: &'c [T],
+        further: impl Fn(usize, &Fewer) -> Vec<T> + Sync,
     ) -> Cow<'c, [T]> {
-        let further = |(b, fewer): (usize, &Fewer)| further(b, fewer, &all);
-        let further: Vec<T> = self.each().flat_map(further).collect();
-        match further.is_empty() {
-            true => all,
-            false => Cow::Owned([&all[..], &further].concat()),
+        let further = of_each(self.points.len(), |b| match self.stands(b) {
+            Stands::Fewer(fewer) => further(b, fewer),
+            Stands::All | Stands::Nothing => Vec::new(),
+        });
+        match further.iter().all(Vec::is_empty) {
+            true => Cow::Borrowed(all),
+            false => Cow::Owned([all, &further.concat()].concat()),
         }
     }
 
-    /// The transpose of [`Few::with_charges`]: of what all of them see, what the bodies' own points do.
+    /// The transpose of [`Standing::with_charges`]: of what all of them see, what the bodies' own points do.
     pub fn without_charges<T: Number>(&self, own: &[Range<usize>], seen: &mut Vec<T>) {
         self.without(own, &self.points, seen, |fewer| &fewer.onto);
     }
 
-    /// The transpose of [`Few::with_numbers`].
+    /// The transpose of [`Standing::with_numbers`].
     pub fn without_numbers(&self, own: &[Range<usize>], seen: &mut Vec<f64>) {
         self.without(own, &self.numbers, seen, |fewer| &fewer.numbers);
     }
@@ -172,17 +177,20 @@ impl Few {
         own: &[Range<usize>],
         few: &[Range<usize>],
         seen: &mut Vec<T>,
-        of: impl Fn(&Fewer) -> &DMatrix<f64>,
+        of: impl Fn(&Fewer) -> &DMatrix<f64> + Sync,
     ) {
-        let (all, further) = seen.split_at_mut(end(own));
-        for (b, fewer) in self.each() {
-            let few = few[b].start - all.len()..few[b].end - all.len();
-            add_products(of(fewer), &further[few], &mut all[own[b].clone()]);
+        let found = of_each(self.points.len(), |b| match self.stands(b) {
+            Stands::Fewer(fewer) => products_of(of(fewer), &seen[few[b].clone()]),
+            Stands::All | Stands::Nothing => Vec::new(),
+        });
+        for (own, found) in own.iter().zip(&found) {
+            let own = seen[own.clone()].iter_mut();
+            own.zip(found).for_each(|(out, x)| *out += *x);
         }
         seen.truncate(end(own));
     }
 
-    /// The transpose of [`Few::add_places`]: forces on the few are ones on the points that they are.
+    /// The transpose of [`Standing::add_places`]: forces on the few are ones on the points that they are.
     pub fn without_places<T: Number>(&self, own: &[Range<usize>], forces: &mut Vec<T>) {
         for (b, fewer) in self.each() {
             for (few, point) in self.points[b].clone().zip(&fewer.points) {
@@ -203,42 +211,13 @@ impl Stands {
     }
 }
 
-/// A x.
-fn combined<T: Number>(a: &DMatrix<f64>, x: &[T]) -> Vec<T> {
-    let mut out = vec![T::constant(0.0); a.nrows()];
-    multipole::vectorized(
-        #[inline(always)]
-        || {
-            for (x, column) in x.iter().zip(a.as_slice().chunks_exact(out.len())) {
-                for (out, a) in out.iter_mut().zip(column) {
-                    *out += *x * *a;
-                }
-            }
-        },
-    );
-    out
-}
-
-/// Adds Aᵀ x.
-fn add_products<T: Number>(a: &DMatrix<f64>, x: &[T], out: &mut [T]) {
-    multipole::vectorized(
-        #[inline(always)]
-        || {
-            for (out, column) in out.iter_mut().zip(a.as_slice().chunks_exact(x.len())) {
-                for (x, a) in x.iter().zip(column) {
-                    *out += *x * *a;
-                }
-            }
-        },
-    );
-}
-
 impl Fewer {
-    /// Of a body that has more points than numbers; none if it would take about as many as these.
+    /// Of a body that has more points than numbers; none if it would take more than these.
     fn of(body: &ReducedBody, levels: &Levels) -> Option<Self> {
-        let parts = body.parts();
-        let reach = parts.points.iter().map(|x| (x - parts.centre).norm());
-        let size = reach.fold(0.0, f64::max);
+        if !(levels.rest > 0.0) {
+            return None;
+        }
+        let (parts, size) = (body.parts(), body.size());
         let from = even(LEAST.max(CHECKS * body.points()));
         let from: Vec<_> = from
             .map(|way| parts.centre + way * (size / levels.fewer.most))
@@ -260,6 +239,10 @@ impl Fewer {
         let basis = body.basis();
         let numbers = Mat::from_fn(basis.nrows(), basis.ncols(), |j, k| basis[(j, k)] * unit(k));
         let targets = &seen * &numbers;
+        // A body that moves no water has no such numbers.
+        if !targets.col_iter().all(|t| t.iter().all(|x| x.is_finite())) {
+            return None;
+        }
         let rest = levels.rest * (from.len() as f64 / size).sqrt();
         let (mut points, left) = pursuit(&seen, &targets, rest, basis.ncols());
         if !(left <= rest) || points.is_empty() {

@@ -1,5 +1,6 @@
 //! Near pairs of bodies, point by point.
 
+use super::Scattering;
 use super::pairs::{Near, Weights};
 use super::places::{Places, Triple, add};
 use crate::adjoint::multipole::{self, Arithmetic, Number, WIDTH};
@@ -38,7 +39,7 @@ impl<T: Number> NearPart<T> {
 
 /// The points and their charges, those of the few that stand for all after them.
 pub(super) struct Charged<'m, T> {
-    pub points: [&'m [Range<usize>]; 2],
+    pub model: &'m Scattering,
     pub places: &'m Places<T>,
     pub weights: &'m Weights<T>,
     pub charges: &'m [T],
@@ -53,7 +54,7 @@ impl<T: Number> Charged<'_, T> {
                 let mut out = NearPart::zeros(self.charges.len(), forces);
                 let mut other = Vec::new();
                 for near in pairs {
-                    let [own, others] = near.bodies.map(|b| self.points_of(near, b));
+                    let [own, others] = near.bodies.map(|b| self.model.points_of(near, b));
                     self.load(others, &mut other);
                     let weight = self.weights.of(near.own, near.within);
                     let energy = self.pair(own, weight, forces, &mut other, &mut out);
@@ -64,11 +65,6 @@ impl<T: Number> Charged<'_, T> {
                 out
             },
         )
-    }
-
-    /// The points of a body that a pair sees.
-    fn points_of(&self, near: &Near, b: usize) -> Range<usize> {
-        self.points[usize::from(near.fewer)][b].clone()
     }
 
     /// Points, eight side by side.

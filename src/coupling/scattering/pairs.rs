@@ -1,7 +1,7 @@
 //! Which cells see each other by their moments, and which bodies by their points, few or all.
 
 use super::cells::Cells;
-use super::levels::{Kind, Levels};
+use super::levels::{Apart, Kind, Levels};
 use super::places::{Places, length, minus};
 use crate::adjoint::multipole::Number;
 use std::collections::BTreeSet;
@@ -106,7 +106,8 @@ impl Pairs {
                 None if hold => {}
                 None => {
                     let bodies = [cells.bodies(a)[0], cells.bodies(b)[0]];
-                    out.by_points([a, b], bodies, deeper, ratio, (levels, fewer(bodies)));
+                    let apart = fewer(bodies).then(|| levels.of(Kind::Points));
+                    out.by_points(([a, b], bodies), deeper, ratio, apart);
                 }
             }
         }
@@ -117,13 +118,11 @@ impl Pairs {
     /// Two bodies by few points, if such stand for them here, by all, or both.
     fn by_points(
         &mut self,
-        cells: [usize; 2],
-        bodies: [usize; 2],
+        (cells, bodies): ([usize; 2], [usize; 2]),
         mut within: Option<usize>,
         ratio: f64,
-        (levels, fewer): (&Levels, bool),
+        apart: Option<&Apart>,
     ) {
-        let apart = levels.of(Kind::Points);
         let mut push = |fewer, own, within| {
             self.near.push(Near {
                 bodies,
@@ -133,7 +132,7 @@ impl Pairs {
                 number: self.near.len(),
             });
         };
-        if fewer && ratio < apart.most {
+        if let Some(apart) = apart.filter(|apart| ratio < apart.most) {
             let blended = ratio > apart.sure;
             let own = blended.then_some(self.blends.len());
             push(true, own, within);
@@ -150,7 +149,7 @@ impl Pairs {
         push(false, None, within);
     }
 
-    /// What each blend leaves to the halves, all around it taken in, and its own weight of the moments, with its slope.
+    /// What each blend leaves to the halves, all around it taken in, and its own weight of the moments or few points, with its slope.
     pub fn weights<T: Number>(&self, places: &Places<T>, levels: &Levels) -> Weights<T> {
         let mut out = Weights {
             around: Vec::with_capacity(self.blends.len()),

@@ -2,7 +2,6 @@
 
 use super::Scattering;
 use super::cells::Cells;
-use super::end;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, point_velocity};
 use crate::adjoint::multipole::{Arithmetic, Number};
 use crate::geometry::Image;
@@ -77,7 +76,7 @@ impl<T: Number> Places<T> {
         poses: &[Pose],
         of: impl Fn(&Image, usize, Vec3) -> Triple<T>,
     ) -> Self {
-        let count = end(&model.points).max(end(&model.few.points));
+        let count = model.standing.all_points(&model.points);
         let mut points = [0; 3].map(|_| Vec::with_capacity(count));
         let mut centres = Vec::with_capacity(model.points.len());
         for image in &model.images {
@@ -93,7 +92,7 @@ impl<T: Number> Places<T> {
             }
         }
         for places in &mut points {
-            model.few.add_places(&model.points, places);
+            model.standing.add_places(&model.points, places);
         }
         Self::of(points, &centres, &model.sizes, &model.cells)
     }

@@ -10,7 +10,6 @@ use crate::adjoint::lie::Vec6;
 use crate::adjoint::multipole::{self, Arithmetic, Number, WIDTH};
 use num_dual::Dual64;
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -257,10 +256,12 @@ impl<'s, T: Number> Sums<'s, T> {
     }
 
     fn near(&self, charges: &[T], forces: bool) -> NearPart<T> {
-        let Scattering { few, points, .. } = self.model;
-        let charges = &*few.with_charges(points, Cow::Borrowed(charges));
+        let Scattering {
+            standing, points, ..
+        } = self.model;
+        let charges = &*standing.with_charges(points, charges);
         let charged = Charged {
-            points: [points, &few.points],
+            model: self.model,
             places: self.places,
             weights: &self.weights,
             charges,
@@ -269,10 +270,10 @@ impl<'s, T: Number> Sums<'s, T> {
         let parts = in_parts(&self.pairs.near, part);
         let mut out = NearPart::zeros(charges.len(), forces);
         parts.into_iter().for_each(|part| out.add(part));
-        few.without_charges(points, &mut out.potentials);
+        standing.without_charges(points, &mut out.potentials);
         if forces {
             for along in &mut out.forces {
-                few.without_places(points, along);
+                standing.without_places(points, along);
             }
         }
         out

@@ -218,7 +218,9 @@ pub(super) fn solve(
                         regularisation = 0.0;
                     }
                 } else if part <= DOUBTED {
-                    regularisation = grow(regularisation);
+                    // What was accepted ends nothing.
+                    let most = settings.most_regularisation.max(regularisation);
+                    regularisation = grow(regularisation).min(most);
                 }
                 (part, fell)
             }

@@ -75,7 +75,7 @@ pub struct IlqrProgress {
     pub cost: f64,
     /// Fall of the cost that the model of the iteration expected.
     pub expected: f64,
-    /// Part of the step that was taken; 0: none, the regularisation grew instead.
+    /// Part of the step that was taken; 0: none. The regularisation grows after none, and after an eighth or less.
     pub part: f64,
     /// Regularisation of the iteration.
     pub regularisation: f64,

@@ -214,7 +214,7 @@ impl Stands {
 impl Fewer {
     /// Of a body that has more points than numbers; none if it would take more than these.
     fn of(body: &ReducedBody, levels: &Levels) -> Option<Self> {
-        if !(levels.rest > 0.0) {
+        if levels.rest <= 0.0 {
             return None;
         }
         let (parts, size) = (body.parts(), body.size());
@@ -245,7 +245,7 @@ impl Fewer {
         }
         let rest = levels.rest * (from.len() as f64 / size).sqrt();
         let (mut points, left) = pursuit(&seen, &targets, rest, basis.ncols());
-        if !(left <= rest) || points.is_empty() {
+        if left > rest || points.is_empty() {
             return None;
         }
         points.sort_unstable();

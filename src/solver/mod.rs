@@ -13,7 +13,6 @@ mod inverse_cholesky;
 mod lu;
 mod matmul;
 mod product;
-mod pursuit;
 mod sparse;
 mod sparse_rows;
 
@@ -27,7 +26,6 @@ pub use inverse_cholesky::{InverseCholesky, LEAST_RHO};
 pub use lu::Lu;
 pub(crate) use matmul::matmul;
 pub use product::{both_products, normal_product, product, transposed_product};
-pub(crate) use pursuit::{least_squares, pursuit};
 pub use sparse::{SparseCholesky, SparsePattern, elimination_order};
 pub use sparse_rows::SparseRows;
 

@@ -3,7 +3,6 @@
 use crate::support::says;
 use hydrograd::adjoint::lie::{Pose, Vec3, Vec6, exp_matrix};
 use hydrograd::adjoint::sample::Samples;
-use hydrograd::coupling::scattering::Levels;
 use hydrograd::coupling::{Coupling, Direction, Linearised};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape};
@@ -93,14 +92,6 @@ fn values_and_derivatives_are_those_of_the_factor() {
     let n = poses.len();
     let mut random = Samples::new(3);
     let basis = DMatrix::from_fn(6 * n, 2, |_, _| random.number());
-    // What few points leave out is far more than what films may differ by.
-    let few = products;
-    let all = products.scattering().unwrap().clone();
-    let levels = Levels {
-        rest: 0.0,
-        ..*all.levels()
-    };
-    let products: &dyn Coupling = &all.with_levels(levels);
     let open = made(&scene, Exchange::Products, false);
     let momenta = |c: &dyn Coupling| {
         c.evaluate(&poses, &basis)
@@ -113,9 +104,6 @@ fn values_and_derivatives_are_those_of_the_factor() {
     let error = differ(&found, &right);
     println!("impulses differ by {error:.1e}");
     assert!(error < 5e-4);
-    let error = differ(&momenta(few), &right);
-    println!("of few points by {error:.1e}");
-    assert!(error < 1e-3);
     // Without films the points don't resolve these gaps at all.
     let refused = coupling(&open).evaluate(&poses, &basis);
     says(refused.err().unwrap().to_string(), &["nearer than", "part"]);
@@ -253,10 +241,9 @@ fn closing_gaps_move_as_with_the_factor_and_have_gradients() {
         Integrator::MomentumEuler,
         Integrator::Midpoint,
     ];
-    // Few points stand for bodies with edges, to the accuracy asked for.
-    for (name, (mut scene, poses), most, [change, gradient]) in [
-        ("round", round(1500.0), 1e-8, [1e-3, 1e-4]),
-        ("edged", pile(1500.0), 3e-5, [5e-3, 1e-3]),
+    for (name, (mut scene, poses), most) in [
+        ("round", round(1500.0), 1e-8),
+        ("edged", pile(1500.0), 3e-5),
     ] {
         let closing = |i: usize| match i % 6 {
             2 => -0.02 - 0.01 * (i / 6) as f64,
@@ -271,8 +258,8 @@ fn closing_gaps_move_as_with_the_factor_and_have_gradients() {
                 let controls = Controls::zeros(&simulator, steps);
                 simulator.rollout(&controls).unwrap()
             });
-            let gained = |r: &hydrograd::Rollout| &r.samples()[steps].v - &r.samples()[0].v;
-            let [found, right] = rollouts.each_ref().map(gained);
+            let change = |r: &hydrograd::Rollout| &r.samples()[steps].v - &r.samples()[0].v;
+            let [found, right] = rollouts.each_ref().map(change);
             let error = differ(&found, &right);
             let last = rollouts[0].samples()[steps].v.clone();
             let mut random = Samples::new(4);
@@ -301,8 +288,7 @@ fn closing_gaps_move_as_with_the_factor_and_have_gradients() {
             println!(
                 "{name}, {integrator:?}: changes of velocity differ by {error:.1e}, gradients from the factor's by {from_factor:.1e}, from differences by {worst:.1e}"
             );
-            assert!(error < change, "{error}");
-            assert!(from_factor < gradient, "{from_factor}");
+            assert!(error < 1e-3 && from_factor < 1e-4, "{error}, {from_factor}");
             assert!(worst < most, "{worst}");
         }
     }

@@ -171,12 +171,6 @@ impl ReducedBody {
         self.parts.points.len()
     }
 
-    /// Largest distance of a point from the centre, m.
-    pub(in crate::coupling) fn size(&self) -> f64 {
-        let arms = self.parts.points.iter().map(|x| x - self.parts.centre);
-        arms.map(|arm| arm.norm()).fold(0.0, f64::max)
-    }
-
     /// Number of modes m: this body's unknowns in the coupled system.
     pub fn modes(&self) -> usize {
         self.parts.modes.ncols()

@@ -1,8 +1,7 @@
 //! The exchange between few numbers of each body, as a solve asks for it again and again at the same places: matrices of near pairs, and moments of each number.
 //!
 //! A body of many points answers with few charges of its own: its modes' and its twist's, [L, Ū] z. Its numbers are z, those of a body that has fewer points its charges. With
-//! P = [L, Ū] or the identity, a near pair's matrix is Pᵀ (1/r) P, weighed, and the moments of a body's numbers are those of P's columns. Few points that stand for a body have charges C P z, which are their own
-//! numbers.
+//! P = [L, Ū] or the identity, a near pair's matrix is Pᵀ (1/r) P, weighed, and the moments of a body's numbers are those of P's columns.
 
 use super::Scattering;
 use super::far::Derivatives;
@@ -54,22 +53,6 @@ struct Room {
 }
 
 impl Scattering {
-    /// A body's points that a pair sees.
-    pub(super) fn points_of(&self, near: &Near, b: usize) -> Range<usize> {
-        match near.fewer {
-            true => self.standing.points[b].clone(),
-            false => self.points[b].clone(),
-        }
-    }
-
-    /// Its numbers, where a pair's matrix has them.
-    fn numbers_of(&self, near: &Near, b: usize) -> Range<usize> {
-        match near.fewer {
-            true => self.standing.numbers[b].clone(),
-            false => self.numbers[b].clone(),
-        }
-    }
-
     /// P of a body or of what a mirror shows of it; none that is the identity.
     pub(super) fn carrier(&self, b: usize) -> Option<MatRef<'_, f64>> {
         let body = &self.bodies[b % self.bodies.len()];
@@ -99,12 +82,12 @@ impl Blocks {
         let near = in_parts(all, |_, pairs: &[Near]| {
             let first = pairs.first().map_or(0, |near| near.number);
             let sizes = pairs.iter().map(|near| {
-                let [rows, columns] = near.bodies.map(|b| model.numbers_of(near, b).len());
+                let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
                 rows.next_multiple_of(LANES) * columns
             });
             let (mut out, mut room) = (model.spare.take(sizes.sum()), Room::default());
             for near in pairs {
-                let weight = sums.weights.of(near.own, near.within);
+                let weight = sums.weights.within(near.within);
                 room.matrix(model, sums.places, near, weight, &mut out);
             }
             (first..first + pairs.len(), out)
@@ -152,7 +135,6 @@ impl Blocks {
 
     fn near(&self, sums: &Sums<'_, f64>, numbers: &[f64]) -> Vec<f64> {
         let model = sums.model;
-        let numbers = &*model.standing.with_numbers(&model.numbers, numbers);
         let part = |(pairs, matrices): &(Range<usize>, Vec<f64>)| {
             let mut out = vec![0.0; numbers.len()];
             multipole::vectorized(
@@ -161,7 +143,7 @@ impl Blocks {
                     let mut rest = &matrices[..];
                     let (mut own, mut seen) = (Vec::new(), Vec::new());
                     for near in &sums.pairs.near[pairs.clone()] {
-                        let [a, b] = near.bodies.map(|b| model.numbers_of(near, b));
+                        let [a, b] = near.bodies.map(|b| model.numbers[b].clone());
                         let stride = a.len().next_multiple_of(LANES);
                         let (matrix, after) = rest.split_at(stride * b.len());
                         rest = after;
@@ -202,7 +184,6 @@ impl Blocks {
         for seen in parts {
             out.iter_mut().zip(seen).for_each(|(out, x)| *out += x);
         }
-        model.standing.without_numbers(&model.numbers, &mut out);
         out
     }
 }
@@ -217,8 +198,8 @@ impl Room {
         weight: f64,
         out: &mut Vec<f64>,
     ) {
-        let [a, b] = near.bodies.map(|b| model.points_of(near, b));
-        let [rows, columns] = near.bodies.map(|b| model.numbers_of(near, b).len());
+        let [a, b] = near.bodies.map(|b| model.points[b].clone());
+        let [rows, columns] = near.bodies.map(|b| model.numbers[b].len());
         let stride = a.len().next_multiple_of(WIDTH);
         // Beyond the last point it stands again.
         for (own, all) in self.to.iter_mut().zip(&places.points) {
@@ -237,11 +218,7 @@ impl Room {
             },
         );
         let room = rows.next_multiple_of(LANES);
-        // Few points are told by their charges.
-        let carriers = near.bodies.map(|b| match near.fewer {
-            true => None,
-            false => model.carrier(b),
-        });
+        let carriers = near.bodies.map(|b| model.carrier(b));
         let all = &self.inverse[..b.len() * stride];
         let start = out.len();
         out.resize(start + room * columns, 0.0);

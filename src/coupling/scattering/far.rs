@@ -95,7 +95,7 @@ fn ways<T: Number>(places: &Places<T>, pairs: &[Far]) -> [T::Pack; 3] {
 fn weights_of<T: Number>(weights: &Weights<T>, pairs: &[Far]) -> T::Pack {
     let mut out = [T::constant(0.0); WIDTH];
     for (out, pair) in out.iter_mut().zip(pairs) {
-        *out = weights.of(pair.own, pair.within);
+        *out = weights.of(pair);
     }
     T::pack(&out)
 }
@@ -198,7 +198,7 @@ pub(super) fn pull<T: Number>(
     centres: &mut [Triple<T>],
 ) {
     for (pair, (_, slope)) in pairs.iter().zip(worth) {
-        let weight = weights.of(pair.own, pair.within);
+        let weight = weights.of(pair);
         let [a, b] = pair.cells;
         add(&mut centres[a], weight, slope);
         add(&mut centres[b], -weight, slope);

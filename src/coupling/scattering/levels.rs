@@ -6,21 +6,8 @@ use crate::{Error, Result};
 
 /// Relative residual at which solves end: what gradients are held against is finer than any level.
 const TOLERANCE: f64 = 1e-10;
-/// Of the ratio from which on moments or few points don't stand for all points, the part up to which they do so alone.
+/// Of the ratio from which on moments don't stand for points, the part up to which they do so alone.
 const SURE: f64 = 0.9;
-/// Ratio up to which few points stand for a body's own.
-const FEWER: f64 = 0.7;
-
-/// What two cells are that see each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// Of one of them several bodies.
-    Groups,
-    /// Two bodies, by their moments.
-    Bodies,
-    /// Two bodies, by few points.
-    Points,
-}
 
 /// Levels of the exchange between many bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,11 +18,6 @@ pub struct Levels {
     pub bodies: Apart,
     /// From where on those of two cells do, of which one holds several bodies: what is left out differs in sign from body to body.
     pub cells: Apart,
-    /// From where on few points of two bodies stand for all of them.
-    pub fewer: Apart,
-    /// What few points leave of the potential from there on (root mean square over a sphere), of each number of a body as large as it is with a unit of energy, times the root of the body's size:
-    /// none stand for all at zero.
-    pub rest: f64,
     /// Relative residual at which solves end.
     pub tolerance: f64,
 }
@@ -70,33 +52,29 @@ impl Levels {
             degree,
             bodies: apart(bodies),
             cells: apart(cells),
-            fewer: apart(FEWER),
-            // Of 64 boxes this leaves a tenth of the accuracy in their accelerations.
-            rest: accuracy,
             tolerance: TOLERANCE,
         })
     }
 
-    pub(super) fn of(&self, kind: Kind) -> &Apart {
-        match kind {
-            Kind::Groups => &self.cells,
-            Kind::Bodies => &self.bodies,
-            Kind::Points => &self.fewer,
+    pub(super) fn of(&self, bodies: bool) -> &Apart {
+        match bodies {
+            true => &self.bodies,
+            false => &self.cells,
         }
     }
 }
 
-/// Sum of the radii over the distance up to which two cells are seen by their moments alone, or bodies by few points, and from which on not at all.
+/// Sum of the radii over the distance up to which two cells are seen by their moments alone, and from which on not at all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Apart {
-    /// Up to which by these alone.
+    /// Up to which by moments alone.
     pub sure: f64,
     /// From which on not at all.
     pub most: f64,
 }
 
 impl Apart {
-    /// Weight of these, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
+    /// Weight of the moments, with its slope: 1 up to `sure`, 0 from `most` on, three derivatives smooth at both.
     pub(super) fn weight<T: Number>(&self, ratio: T) -> [T; 2] {
         let width = self.most - self.sure;
         let [value, slope] = fade((ratio - T::constant(self.sure)) * (1.0 / width));

@@ -1,5 +1,5 @@
-//! Compressed bodies so many that no matrix of them all is formed: the exchange between them is summed where it is used, near ones point by point, those in the middle
-//! distance by few of their points, others by moments about their centres, in groups and groups of groups the farther they are.
+//! Compressed bodies so many that no matrix of them all is formed: the exchange between them is summed where it is used, near ones point by point, groups of
+//! others by moments about their centres, groups of groups the farther they are.
 //!
 //! The same energy as [`Reduced`](super::reduced), whose G is replaced by Ĝ, symmetric and a smooth function of the poses:
 //!
@@ -25,10 +25,8 @@
 mod answers;
 mod blocks;
 mod cells;
-mod columns;
 mod elsewhere;
 mod far;
-mod fewer;
 mod kept;
 mod levels;
 mod linearised;
@@ -62,7 +60,6 @@ use crate::adjoint::multipole::{Pack, Table};
 use crate::geometry::Image;
 use crate::{Error, Result};
 use cells::Cells;
-use fewer::Standing;
 use spare::Spare;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -82,8 +79,6 @@ pub struct Scattering {
     modes: Vec<Range<usize>>,
     /// Of the few numbers that a body's charges are told by while they are solved for; bodies and what mirrors show.
     numbers: Vec<Range<usize>>,
-    /// What stands for bodies in the middle distance.
-    standing: Standing,
     /// Largest distance of a body's points from its centre, m; bodies and what mirrors show.
     sizes: Vec<f64>,
     /// By how much each body counts more where all count alike, if they are unlike.
@@ -154,20 +149,22 @@ impl Scattering {
                 "must be finite",
             ));
         }
+        let size = |body: &Arc<ReducedBody>| {
+            let parts = body.parts();
+            let reach = parts.points.iter().map(|x| (x - parts.centre).norm());
+            reach.fold(0.0, f64::max)
+        };
         let seen = || images.iter().flat_map(|_| &bodies);
         let shown = images.iter().flat_map(|image| {
             let centres = centres.iter();
             centres.map(|c| image.linear * c + image.shift)
         });
-        let points = ranges(seen().map(|b| b.points()));
-        let numbers = ranges(seen().map(|b| b.points().min(b.modes() + 6)));
         Ok(Self {
-            standing: Standing::new(&bodies, &levels, &points, &numbers),
-            points,
-            numbers,
             alone: Isolated::new(bodies.iter().map(|b| b.parts().added_mass).collect()),
+            points: ranges(seen().map(|b| b.points())),
             modes: ranges(bodies.iter().map(|b| b.modes())),
-            sizes: seen().map(|b| b.size()).collect(),
+            numbers: ranges(seen().map(|b| b.points().min(b.modes() + 6))),
+            sizes: seen().map(size).collect(),
             unlike: unlike::weights(&bodies),
             cells: Cells::new(&shown.collect::<Vec<_>>(), images.len()),
             table: Table::new(levels.degree),
@@ -205,25 +202,10 @@ impl Scattering {
         self
     }
 
-    /// The same, cut into these levels.
-    pub fn with_levels(mut self, levels: Levels) -> Self {
-        self.standing = Standing::new(&self.bodies, &levels, &self.points, &self.numbers);
-        self.table = Table::new(levels.degree);
-        self.levels = levels;
-        self
-    }
-
     /// The same, whose sums are made elsewhere: of the same bodies between the same walls, without the same pairs.
-    pub fn summed_by(self, summing: Arc<dyn Summing>) -> Self {
-        // There all points see each other.
-        let levels = Levels {
-            rest: 0.0,
-            ..self.levels
-        };
-        Self {
-            summing: Some(summing),
-            ..self.with_levels(levels)
-        }
+    pub fn summed_by(mut self, summing: Arc<dyn Summing>) -> Self {
+        self.summing = Some(summing);
+        self
     }
 
     /// From bodies that were coupled by a factor, with their names and its films.

@@ -1,6 +1,5 @@
 //! Near pairs of bodies, point by point.
 
-use super::Scattering;
 use super::pairs::{Near, Weights};
 use super::places::{Places, Triple, add};
 use crate::adjoint::multipole::{self, Arithmetic, Number, WIDTH};
@@ -37,9 +36,9 @@ impl<T: Number> NearPart<T> {
     }
 }
 
-/// The points and their charges, those of the few that stand for all after them.
+/// The points and their charges.
 pub(super) struct Charged<'m, T> {
-    pub model: &'m Scattering,
+    pub points: &'m [Range<usize>],
     pub places: &'m Places<T>,
     pub weights: &'m Weights<T>,
     pub charges: &'m [T],
@@ -54,10 +53,8 @@ impl<T: Number> Charged<'_, T> {
                 let mut out = NearPart::zeros(self.charges.len(), forces);
                 let mut other = Vec::new();
                 for near in pairs {
-                    let [own, others] = near.bodies.map(|b| self.model.points_of(near, b));
-                    self.load(others, &mut other);
-                    let weight = self.weights.of(near.own, near.within);
-                    let energy = self.pair(own, weight, forces, &mut other, &mut out);
+                    self.load(near.bodies[1], &mut other);
+                    let energy = self.pair(near, forces, &mut other, &mut out);
                     if forces {
                         out.energies.push(energy);
                     }
@@ -67,10 +64,10 @@ impl<T: Number> Charged<'_, T> {
         )
     }
 
-    /// Points, eight side by side.
+    /// The points of a body, eight side by side.
     #[inline(always)]
-    fn load(&self, all: Range<usize>, out: &mut Vec<Eight<T::Pack>>) {
-        let none = T::Pack::constant(0.0);
+    fn load(&self, b: usize, out: &mut Vec<Eight<T::Pack>>) {
+        let (all, none) = (self.points[b].clone(), T::Pack::constant(0.0));
         out.clear();
         let mut first = all.start;
         while first < all.end {
@@ -93,15 +90,15 @@ impl<T: Number> Charged<'_, T> {
     #[inline(always)]
     fn pair(
         &self,
-        points: Range<usize>,
-        weight: T,
+        near: &Near,
         forces: bool,
         other: &mut [Eight<T::Pack>],
         out: &mut NearPart<T>,
     ) -> T {
+        let weight = self.weights.within(near.within);
         let zero = T::Pack::constant(0.0);
         let mut energy = T::constant(0.0);
-        for i in points {
+        for i in self.points[near.bodies[0]].clone() {
             let own = T::pack(&[self.charges[i]; WIDTH]);
             let point = self.places.point(i).map(|x| T::pack(&[x; WIDTH]));
             let (mut seen, mut force) = (zero, [zero; 3]);

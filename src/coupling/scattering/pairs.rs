@@ -1,18 +1,19 @@
-//! Which cells see each other by their moments, and which bodies by their points, few or all.
+//! Which cells see each other by their moments, and which bodies by their points.
 
 use super::cells::Cells;
-use super::levels::{Apart, Kind, Levels};
+use super::levels::Levels;
 use super::places::{Places, length, minus};
 use crate::adjoint::multipole::Number;
 use std::collections::BTreeSet;
 
-/// Two cells that are no longer wholly seen by their moments, or bodies by few points: part of what they are to each other is that of their halves, or of all points.
+/// Two cells that are no longer wholly seen by their moments: part of what they are to each other is that of their halves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Blend {
     pub cells: [usize; 2],
     /// The blend whose halves' part it belongs to.
     pub within: Option<usize>,
-    pub kind: Kind,
+    /// Whether both are single bodies.
+    pub bodies: bool,
 }
 
 /// Two cells by their moments.
@@ -28,10 +29,6 @@ pub(super) struct Far {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     pub bodies: [usize; 2],
-    /// Whether by those that stand for all.
-    pub fewer: bool,
-    /// Their own blend, if they have one.
-    pub own: Option<usize>,
     pub within: Option<usize>,
     /// Its place in the list.
     pub number: usize,
@@ -52,8 +49,7 @@ impl Pairs {
         cells: &Cells,
         refused: &BTreeSet<[usize; 2]>,
         places: &Places<f64>,
-        levels: &Levels,
-        fewer: impl Fn([usize; 2]) -> bool,
+        apart: &Levels,
     ) -> Self {
         let mut out = Self::default();
         if cells.cells.is_empty() {
@@ -73,11 +69,7 @@ impl Pairs {
                 continue;
             }
             let ratio = ratio(places, [a, b]);
-            let kind = match left.count == 1 && right.count == 1 {
-                true => Kind::Bodies,
-                false => Kind::Groups,
-            };
-            let apart = levels.of(kind);
+            let apart = apart.of(left.count == 1 && right.count == 1);
             let mut deeper = within;
             let hold = !refused.is_empty() && refused.contains(&[a.min(b), a.max(b)]);
             if ratio < apart.most && !hold {
@@ -95,7 +87,7 @@ impl Pairs {
                 out.blends.push(Blend {
                     cells: [a, b],
                     within,
-                    kind,
+                    bodies: left.count == 1 && right.count == 1,
                 });
             }
             // By numbers of bodies, which don't change: what is chosen by size would change suddenly.
@@ -104,53 +96,19 @@ impl Pairs {
                 Some([l, r]) if first => waiting.extend([([r, b], deeper), ([l, b], deeper)]),
                 Some([l, r]) => waiting.extend([([a, r], deeper), ([a, l], deeper)]),
                 None if hold => {}
-                None => {
-                    let bodies = [cells.bodies(a)[0], cells.bodies(b)[0]];
-                    let apart = fewer(bodies).then(|| levels.of(Kind::Points));
-                    out.by_points(([a, b], bodies), deeper, ratio, apart);
-                }
+                None => out.near.push(Near {
+                    bodies: [cells.bodies(a)[0], cells.bodies(b)[0]],
+                    within: deeper,
+                    number: out.near.len(),
+                }),
             }
         }
         out.far = together(out.far, cells.cells.len());
         out
     }
 
-    /// Two bodies by few points, if such stand for them here, by all, or both.
-    fn by_points(
-        &mut self,
-        (cells, bodies): ([usize; 2], [usize; 2]),
-        mut within: Option<usize>,
-        ratio: f64,
-        apart: Option<&Apart>,
-    ) {
-        let mut push = |fewer, own, within| {
-            self.near.push(Near {
-                bodies,
-                fewer,
-                own,
-                within,
-                number: self.near.len(),
-            });
-        };
-        if let Some(apart) = apart.filter(|apart| ratio < apart.most) {
-            let blended = ratio > apart.sure;
-            let own = blended.then_some(self.blends.len());
-            push(true, own, within);
-            if !blended {
-                return;
-            }
-            self.blends.push(Blend {
-                cells,
-                within,
-                kind: Kind::Points,
-            });
-            within = own;
-        }
-        push(false, None, within);
-    }
-
-    /// What each blend leaves to the halves, all around it taken in, and its own weight of the moments or few points, with its slope.
-    pub fn weights<T: Number>(&self, places: &Places<T>, levels: &Levels) -> Weights<T> {
+    /// What each blend leaves to the halves, all around it taken in, and its own weight of the moments, with its slope.
+    pub fn weights<T: Number>(&self, places: &Places<T>, apart: &Levels) -> Weights<T> {
         let mut out = Weights {
             around: Vec::with_capacity(self.blends.len()),
             own: Vec::with_capacity(self.blends.len()),
@@ -161,7 +119,7 @@ impl Pairs {
                 Some(w) => out.left(w),
             };
             out.around.push(around);
-            let apart = levels.of(blend.kind);
+            let apart = apart.of(blend.bodies);
             out.own.push(apart.weight(ratio(places, blend.cells)));
         }
         out
@@ -188,7 +146,7 @@ fn together(far: Vec<Far>, cells: usize) -> Vec<Far> {
 pub(super) struct Weights<T> {
     /// That of the whole blend.
     pub around: Vec<T>,
-    /// The part of its moments, or few points, with its slope in the ratio.
+    /// The part of its moments, with its slope in the ratio.
     pub own: Vec<[T; 2]>,
 }
 
@@ -198,12 +156,14 @@ impl<T: Number> Weights<T> {
         self.around[i] * (T::constant(1.0) - self.own[i][0])
     }
 
-    /// Of a pair with its own blend, or within another.
-    pub fn of(&self, own: Option<usize>, within: Option<usize>) -> T {
-        match (own, within) {
-            (Some(own), _) => self.around[own] * self.own[own][0],
-            (None, Some(within)) => self.left(within),
-            (None, None) => T::constant(1.0),
+    pub fn within(&self, within: Option<usize>) -> T {
+        within.map_or(T::constant(1.0), |w| self.left(w))
+    }
+
+    pub fn of(&self, far: &Far) -> T {
+        match far.own {
+            None => self.within(far.within),
+            Some(own) => self.around[own] * self.own[own][0],
         }
     }
 }

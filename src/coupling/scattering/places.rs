@@ -39,7 +39,7 @@ pub(super) fn add<T: Arithmetic>(out: &mut Triple<T>, factor: T, x: &Triple<T>) 
 
 /// All places in the world.
 pub(super) struct Places<T> {
-    /// Points of all bodies, one body after the other, and then those that stand for these.
+    /// Points of all bodies, one body after the other.
     pub points: [Vec<T>; 3],
     /// Of the cells: the mean of their bodies' centres.
     pub centres: Vec<Triple<T>>,
@@ -76,7 +76,7 @@ impl<T: Number> Places<T> {
         poses: &[Pose],
         of: impl Fn(&Image, usize, Vec3) -> Triple<T>,
     ) -> Self {
-        let count = model.standing.all_points(&model.points);
+        let count = model.points.last().map_or(0, |last| last.end);
         let mut points = [0; 3].map(|_| Vec::with_capacity(count));
         let mut centres = Vec::with_capacity(model.points.len());
         for image in &model.images {
@@ -90,9 +90,6 @@ impl<T: Number> Places<T> {
                 }
                 centres.push(placed(&parts.centre));
             }
-        }
-        for places in &mut points {
-            model.standing.add_places(&model.points, places);
         }
         Self::of(points, &centres, &model.sizes, &model.cells)
     }

@@ -2,7 +2,6 @@
 
 use super::Scattering;
 use super::blocks::Blocks;
-use super::columns::{combined, products};
 use super::elsewhere::{Changed, SummingAt};
 use super::kept::{Answer, Kept};
 use super::narrow::{MovingNarrow, Narrow};
@@ -11,6 +10,7 @@ use super::parts::of_each;
 use super::places::{Places, length, minus};
 use super::sums::{Sums, dual};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
+use crate::adjoint::multipole;
 use crate::coupling::isolated::Isolated;
 use crate::coupling::reduced::FLUX;
 use crate::solver::dot;
@@ -89,8 +89,7 @@ impl Scattering {
         let (pairs, making) = match &self.summing {
             Some(summing) => (Pairs::default(), Made::Elsewhere(summing.place(poses)?)),
             None => {
-                let fewer = |pair| self.standing.stand_for(pair);
-                let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels, fewer);
+                let pairs = Pairs::new(&self.cells, &self.refused, &places, &self.levels);
                 let blocks = Blocks::new(&Sums::new(self, &pairs, &places));
                 (pairs, Made::Here(blocks))
             }
@@ -390,6 +389,31 @@ impl Scattered<'_> {
             rows += own * twist;
         }
     }
+}
+
+/// Aᵀ x, column by column.
+fn products(a: &DMatrix<f64>, x: &[f64]) -> Vec<f64> {
+    let columns = a.as_slice().chunks_exact(x.len());
+    multipole::vectorized(
+        #[inline(always)]
+        || columns.map(|column| dot(column, x)).collect(),
+    )
+}
+
+/// A x.
+fn combined(a: &DMatrix<f64>, x: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; a.nrows()];
+    multipole::vectorized(
+        #[inline(always)]
+        || {
+            for (x, column) in x.iter().zip(a.as_slice().chunks_exact(out.len())) {
+                for (out, a) in out.iter_mut().zip(column) {
+                    *out += x * a;
+                }
+            }
+        },
+    );
+    out
 }
 
 /// x + `part` y.

@@ -256,12 +256,8 @@ impl<'s, T: Number> Sums<'s, T> {
     }
 
     fn near(&self, charges: &[T], forces: bool) -> NearPart<T> {
-        let Scattering {
-            standing, points, ..
-        } = self.model;
-        let charges = &*standing.with_charges(points, charges);
         let charged = Charged {
-            model: self.model,
+            points: &self.model.points,
             places: self.places,
             weights: &self.weights,
             charges,
@@ -270,12 +266,6 @@ impl<'s, T: Number> Sums<'s, T> {
         let parts = in_parts(&self.pairs.near, part);
         let mut out = NearPart::zeros(charges.len(), forces);
         parts.into_iter().for_each(|part| out.add(part));
-        standing.without_charges(points, &mut out.potentials);
-        if forces {
-            for along in &mut out.forces {
-                standing.without_places(points, along);
-            }
-        }
         out
     }
 
@@ -388,7 +378,7 @@ impl<'s, T: Number> Sums<'s, T> {
     ) {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let count = self.pairs.blends.len();
-        // Of each blend: its moments' energy or that of few points, and that of its halves or of all points, blends among them.
+        // Of each blend: its moments' energy, and that of its halves, blends among them.
         let (mut own, mut halves) = (vec![zero; count], vec![zero; count]);
         for (pair, (energy, _)) in self.pairs.far.iter().zip(far) {
             match (pair.own, pair.within) {
@@ -398,10 +388,8 @@ impl<'s, T: Number> Sums<'s, T> {
             }
         }
         for (pair, energy) in self.pairs.near.iter().zip(near) {
-            match (pair.own, pair.within) {
-                (Some(i), _) => own[i] = *energy,
-                (None, Some(w)) => halves[w] += *energy,
-                (None, None) => {}
+            if let Some(w) = pair.within {
+                halves[w] += *energy;
             }
         }
         for (i, blend) in self.pairs.blends.iter().enumerate().rev() {

@@ -23,6 +23,7 @@
 
 mod modes;
 mod proxies;
+mod pursuit;
 mod region;
 mod samples;
 mod slope;
@@ -33,7 +34,6 @@ use super::{CompressedParts, Fit, ReducedBody, Region};
 use crate::adjoint::lie::Vec3;
 use crate::boundary::Response;
 use crate::geometry::{Ball, Interior, TriMesh};
-use crate::solver::{least_squares, pursuit};
 use crate::{Error, Result};
 use faer::Mat;
 use proxies::{CANDIDATES, DEPTH, Proxies, SPACING, TANGENT};
@@ -247,7 +247,7 @@ fn choose(
         None => (REST * settings.tolerance.sqrt(), usize::MAX),
     };
     let most = most.min(fitted.points.len() / FITTED);
-    let (columns, left) = pursuit(&field, &targets, rest, most);
+    let (columns, left) = pursuit::pursuit(&field, &targets, rest, most);
     let field = Mat::from_fn(field.nrows(), columns.len(), |i, k| field[(i, columns[k])]);
     let (points, spread) = sources.chosen(&columns);
     Ok(Chosen {
@@ -284,8 +284,8 @@ pub fn compress(
     regions: &[Region],
 ) -> Result<ReducedBody> {
     let chosen = choose(name, mesh, response, settings, regions)?;
-    let modes = least_squares(&chosen.field, &chosen.modes);
-    let strengths = least_squares(&chosen.field, &chosen.own);
+    let modes = pursuit::least_squares(&chosen.field, &chosen.modes);
+    let strengths = pursuit::least_squares(&chosen.field, &chosen.own);
     let (modes, strengths) = (&chosen.spread * modes, &chosen.spread * strengths);
 
     // What the compressed body says at points that it was not fitted to.

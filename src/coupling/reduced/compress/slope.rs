@@ -12,11 +12,11 @@
 use super::super::views::dense;
 use super::super::{Region, ShapeSlope};
 use super::proxies::Proxies;
+use super::pursuit::least_squares;
 use super::{Chosen, CompressSettings, choose, potentials_weighted, symmetrise};
 use crate::adjoint::lie::{Mat6, Vec3};
 use crate::boundary::Response;
 use crate::geometry::TriMesh;
-use crate::solver::least_squares;
 use crate::{Error, Result};
 use faer::Mat;
 use nalgebra::DMatrix;

@@ -13,7 +13,7 @@ const FLOOR: f64 = 1e-9;
 /// rests most, until every rest is at most `tolerance` long, or `most` are chosen. With the length of the longest rest.
 ///
 /// Works on the products `AᵀA` and `AᵀT` alone, updated as in a Cholesky factorisation with pivoting.
-pub(crate) fn pursuit(
+pub(super) fn pursuit(
     a: &Mat<f64>,
     targets: &Mat<f64>,
     tolerance: f64,
@@ -67,7 +67,7 @@ pub(crate) fn pursuit(
 }
 
 /// Least-squares solution of `a x ≈ b`.
-pub(crate) fn least_squares(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+pub(super) fn least_squares(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     a.qr().solve_lstsq(b)
 }
 

@@ -20,13 +20,21 @@ const BY_FACTOR: usize = 64;
 const SIZES: [usize; 7] = [2, 4, 16, 64, 256, 1024, 4096];
 
 #[derive(Clone, Copy)]
-enum Kind {
+pub enum Kind {
     Spheres,
     Ellipsoids,
     /// With edges: of many more points than the others.
     Boxes,
     Fish,
 }
+
+/// What is measured, by the names that they are asked for with; the last has joints.
+pub const KINDS: [(Kind, &str); 4] = [
+    (Kind::Spheres, "spheres"),
+    (Kind::Ellipsoids, "ellipsoids"),
+    (Kind::Boxes, "boxes"),
+    (Kind::Fish, "fish"),
+];
 
 /// On a jittered grid with gaps of about a radius, `count` bodies; of fish three links each.
 fn scene(kind: Kind, count: usize, seed: u64) -> Scene {
@@ -165,12 +173,7 @@ pub fn sizes(most: usize, asked: impl Fn(&str) -> bool) -> hydrograd::Result<()>
         backend()
     );
     let before = peak();
-    for (kind, name) in [
-        (Kind::Spheres, "spheres"),
-        (Kind::Ellipsoids, "ellipsoids"),
-        (Kind::Boxes, "boxes"),
-        (Kind::Fish, "fish"),
-    ] {
+    for (kind, name) in KINDS {
         if !asked(name) {
             continue;
         }
@@ -296,15 +299,11 @@ pub fn iterations() -> hydrograd::Result<()> {
 
 /// The largest error of accelerations against the factor over random configurations of 64 bodies, and the largest change of the total momentum.
 pub fn errors(configurations: u64) -> hydrograd::Result<()> {
-    let kinds = [
-        (Kind::Spheres, "spheres"),
-        (Kind::Ellipsoids, "ellipsoids"),
-        (Kind::Boxes, "boxes"),
-    ];
-    let (mut worst, mut kept) = ([0.0_f64; 3], 0.0_f64);
+    let [free @ .., _] = KINDS;
+    let (mut worst, mut kept) = ([0.0_f64; KINDS.len() - 1], 0.0_f64);
     for seed in 0..configurations {
-        let of = seed as usize % kinds.len();
-        let scene = scene(kinds[of].0, 64, 100 + seed);
+        let of = seed as usize % free.len();
+        let scene = scene(free[of].0, 64, 100 + seed);
         let found = measured(&scene, Exchange::Products, false)?;
         let other = measured(&scene, Exchange::Factor, false)?;
         let (a, b) = (accelerations(&found.rollout), accelerations(&other.rollout));
@@ -314,7 +313,7 @@ pub fn errors(configurations: u64) -> hydrograd::Result<()> {
         kept = kept.max(change / samples[0].largest_momentum.amax());
     }
     println!("\n{configurations} configurations of 64 bodies at {ACCURACY}:");
-    for ((_, name), worst) in kinds.iter().zip(worst) {
+    for ((_, name), worst) in free.iter().zip(worst) {
         println!("accelerations of {name} differ from the factor's by up to {worst:.1e}");
     }
     println!("total momentum changes by up to {kept:.1e} of the largest");

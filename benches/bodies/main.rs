@@ -75,9 +75,7 @@ fn main() -> hydrograd::Result<()> {
     }
     if !asked("isolated") {
         coupled::iterations()?;
-        let kinds = ["spheres", "ellipsoids", "boxes", "fish"]
-            .iter()
-            .any(|kind| asked(kind));
+        let kinds = coupled::KINDS.iter().any(|(_, name)| asked(name));
         coupled::sizes(number.unwrap_or(4096), |kind| !kinds || asked(kind))?;
     }
     if !asked("coupled") {

@@ -13,6 +13,20 @@ pub(super) const DEEPEST: usize = 128;
 /// Largest number that is taken: squares and products of such stay finite.
 pub(super) const LARGEST: f64 = 1e30;
 
+/// What a value must be that isn't so many numbers, the fewest and the most: where one is too large, how large it may be.
+pub(super) fn numbers_asked([fewest, most]: [usize; 2], value: &str) -> String {
+    let count = match (fewest, most) {
+        (1, 1) => "one finite number".into(),
+        (a, b) if a == b => format!("{a} finite numbers between blanks"),
+        (a, b) => format!("{a} to {b} finite numbers between blanks"),
+    };
+    let each = value.split_whitespace().flat_map(str::parse::<f64>);
+    match each.into_iter().any(|x| x.is_finite() && x.abs() > LARGEST) {
+        true => format!("{count} of at most {LARGEST:e} in size"),
+        false => count,
+    }
+}
+
 /// A robot's file.
 pub(super) struct File {
     pub path: PathBuf,

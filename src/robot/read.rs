@@ -3,7 +3,9 @@
 //! `urdf-rs` gives the typed form. It passes over what it doesn't know and says neither where an error is nor what was left out, so the text
 //! is first looked through as XML: what can't be is refused there with line and name, what isn't used is listed, and what is used alone is handed on ([`kept`](mod@super::kept)).
 
-use super::file::{File, JointText, LARGEST, check_depth, document, guarded, parse_error};
+use super::file::{
+    File, JointText, LARGEST, check_depth, document, guarded, numbers_asked, parse_error,
+};
 use super::kept::kept;
 use super::known::{needed_attributes, read_attributes};
 use super::mjcf;
@@ -320,16 +322,8 @@ impl Look<'_, '_> {
         match right {
             true => Ok(()),
             false => {
-                let numbers = match count {
-                    1 => "one finite number".into(),
-                    _ => format!("{count} finite numbers between blanks"),
-                };
-                let large = found.iter().flatten().any(|x| x.is_finite() && !may(x));
-                let most = match large {
-                    true => format!(" of at most {LARGEST:e} in size"),
-                    false => String::new(),
-                };
-                let what = format!("<{tag}>: {name} = {value:?} must be {numbers}{most}");
+                let numbers = numbers_asked([count; 2], value);
+                let what = format!("<{tag}>: {name} = {value:?} must be {numbers}");
                 Err(self.wrong(node, what))
             }
         }

@@ -456,6 +456,10 @@ fn attributes_are_checked_and_told() {
     wrong("<geom size=\"1\" pos=\"0 0 nan\"/>", &["pos", three]);
     wrong("<geom size=\"1\" pos=\"0,0,1\"/>", &["pos", three]);
     wrong(
+        "<geom size=\"1\" pos=\"0 0 1e40\"/>",
+        &["pos", three, "of at most 1e30 in size"],
+    );
+    wrong(
         "<geom size=\"1\" density=\"inf\"/>",
         &["density", "one finite number"],
     );

@@ -1,6 +1,6 @@
 //! The attributes of elements that are read, what they may be, and those that MJCF has besides.
 
-use super::super::file::LARGEST;
+use super::super::file::{LARGEST, numbers_asked};
 use super::element::{Element, TURNS};
 use crate::Result;
 
@@ -264,17 +264,13 @@ fn lacks(kind: Kind, name: &str, value: &str) -> Option<String> {
                         .into()
                 })
             }
-            _ => Some("one finite number".into()),
+            _ => Some(numbers_asked([1; 2], value)),
         },
         Kind::Numbers(fewest, most) => {
             let found = numbers(value);
             let right = (found.as_ref()).is_some_and(|all| (fewest..=most).contains(&all.len()));
             let Some(all) = found.filter(|_| right) else {
-                return Some(match (fewest, most) {
-                    (1, 1) => "one finite number".into(),
-                    (a, b) if a == b => format!("{a} finite numbers between blanks"),
-                    (a, b) => format!("{a} to {b} finite numbers between blanks"),
-                });
+                return Some(numbers_asked([fewest, most], value));
             };
             let zero = |part: &[f64]| part.iter().all(|x| *x == 0.0);
             match name {

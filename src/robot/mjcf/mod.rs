@@ -102,7 +102,11 @@ impl Made<'_> {
     /// Refuses numbers that nothing here has.
     fn check(&self, of: &str, what: &str, numbers: &[f64]) -> Result<()> {
         match numbers.iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
-            Some(bad) => Err(self.wrong(&format!("{of}: {what}"), bad, "give finite numbers")),
+            Some(bad) => Err(self.wrong(
+                &format!("{of}: {what}"),
+                bad,
+                &format!("give finite numbers of at most {LARGEST:e} in size"),
+            )),
             None => Ok(()),
         }
     }

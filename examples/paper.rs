@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_naive_push_in_water_loses_the_coin() {
+    fn a_descent_catches_what_the_naive_push_loses_in_water() {
         let numbers = quick("fig1");
         let of = |name: &str, what: &str| numbers[name][what].as_f64().unwrap();
         for (name, caught) in [("naive_dry", true), ("naive", false), ("optimised", true)] {
@@ -186,6 +186,10 @@ mod tests {
         assert!(of("naive", "coin_pushed_m") > 0.2 && of("naive", "gripper_moved_m") < 0.1);
         assert!(of("naive", "coin_along_the_fingers_m") > 1.6);
         assert!(of("optimised", "gripper_moved_m") > 0.1, "{numbers:?}");
+        assert!(
+            numbers["cost_cut_by"].as_f64().unwrap() > 10.0,
+            "{numbers:?}"
+        );
     }
 
     #[test]

@@ -35,7 +35,10 @@ pub fn make(how: &How) -> Made {
 
     let start = Instant::now();
     let search = Task::new(&plain, task::CHEAP)?;
-    let mut found = search.find(&search.through(&naive)?, |_, _| ())?;
+    let through = search.through(&naive)?;
+    let before = search.cost(&through)?;
+    let mut found = search.find(&through, |_, _| ())?;
+    let cut_by = before / found.cost;
     let (mut iterations, mut spent) = (found.iterations, search.spent());
     let optimised = match how.quick {
         true => search.rollout(&found.x)?,
@@ -59,6 +62,7 @@ pub fn make(how: &How) -> Made {
     for (name, _, rollout) in runs {
         numbers.insert(name.into(), report(rollout, gaps)?);
     }
+    numbers.insert("cost_cut_by".into(), json!(cut_by));
     numbers.insert("iterations".into(), json!(iterations));
     numbers.insert("rollouts_with_gradients".into(), json!(spent.gradients));
     numbers.insert("seconds".into(), json!(seconds));

@@ -50,6 +50,7 @@ class Observed(NamedTuple):
     rotations: Array | None
     q: Array | None
     v: Array | None
+    applied_controls: Array | None
 
 
 class Pulled(NamedTuple):
@@ -218,17 +219,22 @@ def roll(
 
 def observe(physics: Physics, steps: int, rollouts: Sequence[Rollout]) -> Observed:
     """What was observed of rollouts of `steps` steps."""
-    sim, batch, states = physics.sim, len(rollouts), steps + 1
-    out = Observed(
-        np.empty((batch, states, physics.bodies, 3)),
-        np.empty((batch, states, physics.bodies, 3, 3)),
-        np.empty((batch, states, sim.q_size)),
-        np.empty((batch, states, sim.v_size)),
-    )
+    out = _empty(physics, len(rollouts), steps)
     for name, array in out._asdict().items():
         for b, rollout in enumerate(rollouts):
             array[b] = getattr(rollout, name)
     return out
+
+
+def _empty(physics: Physics, batch: int, steps: int) -> Observed:
+    sim, states = physics.sim, steps + 1
+    return Observed(
+        np.empty((batch, states, physics.bodies, 3)),
+        np.empty((batch, states, physics.bodies, 3, 3)),
+        np.empty((batch, states, sim.q_size)),
+        np.empty((batch, states, sim.v_size)),
+        np.empty((batch, steps, sim.control_size)),
+    )
 
 
 def seen(observed: Observed) -> list[Array]:
@@ -254,6 +260,8 @@ def pull(
             seeds["q"] = chart.tangent(rollout.q, bar.q[b])
         if bar.v is not None:
             seeds["v"] = bar.v[b]
+        if bar.applied_controls is not None:
+            seeds["applied_controls"] = bar.applied_controls[b]
         made = rollout.vjp(**seeds, progress=progress)
         values = [made.parameters[name] for name in physics.names]
         return made.controls, made.initial_q, made.initial_v, values, made.gains
@@ -265,7 +273,7 @@ def push(
     physics: Physics, rollouts: Sequence[Rollout], q: Array, lengths: Array, along: Pulled, alone: bool = False
 ) -> Observed:
     """Tangents of rollouts that began at `q`, a row for each of `along`; rows of the same rollout share its work."""
-    chart, sim, rows = physics.charts, physics.sim, _together(rollouts)
+    chart, rows = physics.charts, _together(rollouts)
     turned = chart.turned(q, lengths, along.q)
 
     def one(first: int) -> Observed:
@@ -273,15 +281,9 @@ def push(
         made = rollout.jvp(controls=along.controls[of], q=turned[of], v=along.v[of], **_named(physics, along, of))
         columns = np.swapaxes(rollout.rotations, -1, -2)
         spun = np.swapaxes(cross(made.rotations[..., None, :], columns), -1, -2)
-        return Observed(made.positions, spun, chart.moved(rollout.q, made.q), made.v)
+        return Observed(made.positions, spun, chart.moved(rollout.q, made.q), made.v, made.applied_controls)
 
-    batch, states = len(rollouts), rollouts[0].steps + 1
-    out = Observed(
-        np.empty((batch, states, physics.bodies, 3)),
-        np.empty((batch, states, physics.bodies, 3, 3)),
-        np.empty((batch, states, sim.q_size)),
-        np.empty((batch, states, sim.v_size)),
-    )
+    out = _empty(physics, len(rollouts), rollouts[0].steps)
     for of, made in zip(rows.values(), each(one, rows, alone=alone), strict=True):
         for array, part in zip(seen(out), seen(made), strict=True):
             array[of] = part

@@ -42,6 +42,8 @@ class Tangents:
     """Of the bodies' origins, (N + 1, bodies, 3), world axes."""
     rotations: NDArray[np.float64]
     """Of the bodies' rotations, (N + 1, bodies, 3): δθ of δR = δθ × R, rad, world axes."""
+    applied_controls: NDArray[np.float64]
+    """Of the controls that acted, those of the controller included, (N, control_size)."""
     observables: dict[str, NDArray[np.float64]]
     """Of the other observables that were asked for, by name, (N + 1, …); "site_rotations" as `rotations`, (N + 1, sites, 3)."""
 

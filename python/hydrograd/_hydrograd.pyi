@@ -207,8 +207,9 @@ class Mimic:
 
 @final
 class Servo:
-    """Makes the control of an actuated joint with one coordinate its target (m or rad): a drive of `stiffness` (N/m or N m/rad) and `damping` (N s/m or N m s/rad), implicit, and so
-    stable however stiff, with the integrators "momentum-euler", "energy-euler" and "midpoint"."""
+    """Makes the control of an actuated joint with one coordinate its target (m or rad): a drive of `stiffness` k (N/m or N m/rad) and `damping` c (N s/m or N m s/rad), implicit, and so
+    stable however stiff, with the integrators "momentum-euler", "energy-euler" and "midpoint". It aims at where the joint will be a time step Δt later, τ = k (u − q − Δt q̇) − c q̇: with every
+    integrator it damps by k Δt more than c."""
     def __new__(cls, stiffness: float, damping: float = 0.0) -> Servo: ...
 
 @final
@@ -412,10 +413,10 @@ class Scene:
         self,
         kind: Literal["spring"],
         *,
-        body: str,
+        body: str | int,
         stiffness: float,
         at: ArrayLike = (0.0, 0.0, 0.0),
-        to: str | None = None,
+        to: str | int | None = None,
         to_at: ArrayLike = (0.0, 0.0, 0.0),
         rest_length: float = 0.0,
         damping: float = 0.0,
@@ -437,7 +438,7 @@ class Scene:
         self,
         kind: Literal["damping"],
         *,
-        body: str,
+        body: str | int,
         at: ArrayLike = (0.0, 0.0, 0.0),
         linear: ArrayLike | None = None,
         quadratic: ArrayLike | None = None,
@@ -448,7 +449,7 @@ class Scene:
         self,
         kind: Literal["thruster"],
         *,
-        body: str,
+        body: str | int,
         direction: ArrayLike,
         at: ArrayLike = (0.0, 0.0, 0.0),
         polynomial: ArrayLike = (),
@@ -456,7 +457,7 @@ class Scene:
         dead_band: float = 0.0,
         torque: float = 0.0,
         loss: float = 0.0,
-        rotor: str | None = None,
+        rotor: str | int | None = None,
         time_constant: float | None = None,
         smoothing: float = 0.01,
         name: str | None = None,
@@ -466,7 +467,7 @@ class Scene:
         self,
         kind: Literal["fin"],
         *,
-        body: str,
+        body: str | int,
         chord: ArrayLike,
         normal: ArrayLike,
         area: float,
@@ -483,7 +484,7 @@ class Scene:
         self,
         kind: Literal["edge"],
         *,
-        body: str,
+        body: str | int,
         span: float,
         at: ArrayLike = (0.0, 0.0, 0.0),
         forward: ArrayLike = (1.0, 0.0, 0.0),
@@ -518,7 +519,7 @@ class Scene:
         self,
         kind: Literal["float"],
         *,
-        body: str,
+        body: str | int,
         at: ArrayLike = (0.0, 0.0, 0.0),
         volume: float = 0.0,
         mass: float = 0.0,
@@ -995,7 +996,7 @@ class Rollout:
         """Kinetic energy of bodies and fluid, (N + 1,), J."""
     @property
     def potential_energy(self) -> _Array:
-        """Potential energy of weight and buoyancy, (N + 1,), J."""
+        """Potential energy of weight, buoyancy, springs, joints and tendons (those at the control 0), (N + 1,), J."""
     @property
     def momentum(self) -> _Array:
         """Total momentum of bodies and fluid, (N + 1, 6): linear, kg m/s, then angular about the world's origin, kg m²/s."""
@@ -1087,13 +1088,14 @@ class Rollout:
         q: ArrayLike | None = None,
         v: ArrayLike | None = None,
         controls: ArrayLike | None = None,
+        applied_controls: ArrayLike | None = None,
         observables: Mapping[str, ArrayLike] | None = None,
         density: float = 0.0,
         progress: _Progress | None = None,
     ) -> Gradient:
         """Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
         space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
-        (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
+        (N + 1, bodies, 3), `controls`, what the loss has of the open-loop ones directly, and `applied_controls`, those with what the controller added, (N, control_size); `observables` has
         cotangents of others by name, each in the shape that `observe` gives, but of "q", "rotations" and "site_rotations" in the tangent space, as `q` and `rotations`; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it."""
     def jvp(
         self,
@@ -1196,6 +1198,9 @@ def mean_pressure(point: ArrayLike, target: float, weight: float = 1.0, *, body:
     """The mean of `final_pressure` over all states."""
 def effort(weight: float) -> Objective:
     """`weight` times the sum of the squared open-loop controls (N², N² m²)."""
+
+def applied_effort(weight: float) -> Objective:
+    """`weight` times the sum of the squares of the controls that acted, the open-loop ones and what the controller added (N², N² m²): its gains have a share in it."""
 
 _Derivative = ArrayLike | None
 

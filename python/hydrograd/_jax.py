@@ -187,13 +187,13 @@ ad.primitive_jvps[host_call] = _once
 
 
 # Dimensions of controls, q, v, values and gains without the batch's; then those of cotangents or of a state's memory.
-ROLLOUT, OBSERVED = (2, 1, 1, 1, 1), (3, 4, 2, 2)
+ROLLOUT, OBSERVED = (2, 1, 1, 1, 1), (3, 4, 2, 2, 2)
 STEP, MEMORY = (1, 1, 1, 1, 1), (0, 0, 1)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
 def rollout(physics: Physics, *arrays: Array) -> tuple[Array, ...]:
-    """Positions, rotations, q and v of rollouts of controls, q, v, values and gains with the same leading
+    """Positions, rotations, q, v and applied controls of rollouts of controls, q, v, values and gains with the same leading
     dimensions."""
     return Host(_roll, physics, ROLLOUT).call(arrays, _observed(physics, arrays))
 
@@ -214,7 +214,8 @@ def _observed(physics: Physics, arrays: Sequence[Array]) -> list[tuple[tuple[int
     controls, q, v, *_ = arrays
     lead = (*q.shape[:-1], controls.shape[-2] + 1)
     inner = [(physics.bodies, 3), (physics.bodies, 3, 3), q.shape[-1:], v.shape[-1:]]
-    return [((*lead, *shape), q.dtype) for shape in inner]
+    applied = (*q.shape[:-1], *controls.shape[-2:])
+    return [*(((*lead, *shape), q.dtype) for shape in inner), (applied, q.dtype)]
 
 
 def _roll(physics: Physics, flat: Sequence[NDArray[Any]], alone: bool) -> Sequence[NDArray[Any]]:

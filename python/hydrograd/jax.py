@@ -53,6 +53,8 @@ class Trajectory(NamedTuple):
     """Joint coordinates, (…, N + 1, q_size), m, rad and unit quaternions (w, x, y, z)."""
     v: Array
     """Generalised velocities, (…, N + 1, v_size), m/s and rad/s."""
+    applied_controls: Array
+    """Controls that acted in the steps, `controls` and what the scene's controller added, (…, N, control_size), N and N m."""
 
 
 class State(NamedTuple):

@@ -2,6 +2,7 @@
 
 from hydrograd._hydrograd import (
     Objective,
+    applied_effort,
     effort,
     final_coordinate,
     final_flow,
@@ -17,6 +18,7 @@ from hydrograd._hydrograd import (
 
 __all__ = [
     "Objective",
+    "applied_effort",
     "effort",
     "final_coordinate",
     "final_flow",

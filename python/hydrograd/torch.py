@@ -47,6 +47,8 @@ class Trajectory(NamedTuple):
     """Joint coordinates, (…, N + 1, q_size), m, rad and unit quaternions (w, x, y, z)."""
     v: Tensor
     """Generalised velocities, (…, N + 1, v_size), m/s and rad/s."""
+    applied_controls: Tensor
+    """Controls that acted in the steps, `controls` and what the scene's controller added, (…, N, control_size), N and N m."""
     rollouts: list[Rollout]
     """The rollouts behind them, with their warnings, energies and gaps, in the order of the flattened batch."""
 
@@ -139,7 +141,7 @@ class _Rolling:
     """Rollouts of flat batches of controls, q, v, values and gains; what was run is kept, by all that it depends on."""
 
     # Arrays that it is given, and those that it gives with derivatives.
-    given, differentiable = 5, 4
+    given, differentiable = 5, 5
 
     def __init__(self, physics: Physics, alone: bool) -> None:
         self.physics, self.alone = physics, alone

@@ -95,8 +95,9 @@ impl Mimic {
     }
 }
 
-/// Makes the control of an actuated joint with one coordinate its target (m or rad): a drive of `stiffness` (N/m or N m/rad) and `damping` (N s/m or N m s/rad), implicit, and so
-/// stable however stiff, with the integrators "momentum-euler", "energy-euler" and "midpoint".
+/// Makes the control of an actuated joint with one coordinate its target (m or rad): a drive of `stiffness` k (N/m or N m/rad) and `damping` c (N s/m or N m s/rad), implicit, and so
+/// stable however stiff, with the integrators "momentum-euler", "energy-euler" and "midpoint". It aims at where the joint will be a time step Δt later, τ = k (u − q − Δt q̇) − c q̇: with every
+/// integrator it damps by k Δt more than c.
 #[pyclass(frozen, eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Servo(pub scene::Servo);

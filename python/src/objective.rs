@@ -185,6 +185,12 @@ fn effort(weight: f64) -> Objective {
     Objective(objective::effort(weight))
 }
 
+/// `weight` times the sum of the squares of the controls that acted, the open-loop ones and what the controller added (N², N² m²): its gains have a share in it.
+#[pyfunction]
+fn applied_effort(weight: f64) -> Objective {
+    Objective(objective::applied_effort(weight))
+}
+
 /// Adds the functions to the module.
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(final_position, m)?)?;
@@ -197,5 +203,6 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(mean_flow, m)?)?;
     m.add_function(wrap_pyfunction!(final_pressure, m)?)?;
     m.add_function(wrap_pyfunction!(mean_pressure, m)?)?;
-    m.add_function(wrap_pyfunction!(effort, m)?)
+    m.add_function(wrap_pyfunction!(effort, m)?)?;
+    m.add_function(wrap_pyfunction!(applied_effort, m)?)
 }

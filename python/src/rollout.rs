@@ -155,7 +155,7 @@ impl Rollout {
         self.numbers(py, |s| vec![s.kinetic_energy], &[])
     }
 
-    /// Potential energy of weight and buoyancy, (N + 1,), J.
+    /// Potential energy of weight, buoyancy, springs, joints and tendons (those at the control 0), (N + 1,), J.
     #[getter]
     fn potential_energy<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         self.numbers(py, |s| vec![s.potential_energy], &[])
@@ -459,9 +459,9 @@ impl Rollout {
 
     /// Transpose of the rollout: the gradient of Σ cotangent · δ(observation), for any loss of your own. `q` in the tangent
     /// space of the coordinates and `v` are (N + 1, v_size), `positions` and `rotations` (δR = δθ × R, world axes)
-    /// (N + 1, bodies, 3), `controls`, what the loss has of them directly, (N, control_size); `observables` has
+    /// (N + 1, bodies, 3), `controls`, what the loss has of the open-loop ones directly, and `applied_controls`, those with what the controller added, (N, control_size); `observables` has
     /// cotangents of others by name, each in the shape that `observe` gives, but of "q", "rotations" and "site_rotations" in the tangent space, as `q` and `rotations`; `density` what the loss has of the water's density directly. What is None is zero. `progress` is that of `gradient`. Ctrl-C ends it.
-    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, observables=None, density=0.0, progress=None))]
+    #[pyo3(signature = (*, positions=None, rotations=None, q=None, v=None, controls=None, applied_controls=None, observables=None, density=0.0, progress=None))]
     #[expect(clippy::too_many_arguments, reason = "one per keyword")]
     fn vjp<'py>(
         &self,
@@ -471,6 +471,7 @@ impl Rollout {
         q: Option<&Bound<'py, PyAny>>,
         v: Option<&Bound<'py, PyAny>>,
         controls: Option<&Bound<'py, PyAny>>,
+        applied_controls: Option<&Bound<'py, PyAny>>,
         observables: Option<&Bound<'py, PyAny>>,
         density: f64,
         progress: Option<&Bound<'py, PyAny>>,
@@ -481,7 +482,7 @@ impl Rollout {
         let bodies = [Dim::Is(self.bodies()), Dim::Is(3)];
         let nv = [Dim::Is(seed.q.nrows())];
         let nu = [Dim::Is(seed.controls.nrows())];
-        let parts: [(&str, _, &mut DMatrix<f64>, usize, &[Dim]); 5] = [
+        let parts: [(&str, _, &mut DMatrix<f64>, usize, &[Dim]); 6] = [
             (
                 "vjp: positions",
                 positions,
@@ -499,6 +500,13 @@ impl Rollout {
             ("vjp: q", q, &mut seed.q, states, &nv),
             ("vjp: v", v, &mut seed.v, states, &nv),
             ("vjp: controls", controls, &mut seed.controls, steps, &nu),
+            (
+                "vjp: applied_controls",
+                applied_controls,
+                &mut seed.applied_controls,
+                steps,
+                &nu,
+            ),
         ];
         for (place, given, part, count, inner) in parts {
             if let Some(given) = given {

@@ -10,7 +10,7 @@ use crate::mapping;
 use crate::robot::{self, Robot};
 use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyDict};
+use pyo3::types::{IntoPyDict, PyDict, PyInt};
 use std::path::PathBuf;
 
 /// A force whose keys or values don't fit.
@@ -21,6 +21,9 @@ fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
         "must be a kind of force with the keys that it has in a scene file",
     )
 }
+
+/// Keys of forces that name a body.
+const OF_BODIES: [&str; 3] = ["body", "to", "rotor"];
 
 /// As it is now: other threads may go on with the scene while something is made of it.
 pub fn copied(scene: &Bound<'_, Scene>) -> PyResult<hydrograd::Scene> {
@@ -40,6 +43,28 @@ fn is_same(a: &hydrograd::Scene, b: &hydrograd::Scene) -> bool {
 #[pyclass(eq, module = "hydrograd")]
 #[derive(Clone, PartialEq)]
 pub struct Scene(pub hydrograd::Scene);
+
+impl Scene {
+    /// The name of a body given by its number or its name, as `key` of `what`.
+    fn named_body(&self, what: &str, key: &str, body: &Bound<'_, PyAny>) -> PyResult<String> {
+        let named = match body.extract::<usize>() {
+            Ok(number) => self.0.bodies.get(number).map(|b| b.name.clone()),
+            Err(_) => body.extract::<String>().ok(),
+        };
+        named
+            .filter(|name| self.0.body(name).is_some())
+            .ok_or_else(|| {
+                input(
+                    &format!("{what}: {key}"),
+                    body.to_string(),
+                    format!(
+                        "must be the number or name of a body: {:?}",
+                        self.body_names()
+                    ),
+                )
+            })
+    }
+}
 
 #[pymethods]
 impl Scene {
@@ -167,7 +192,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Adds a force by its kind and the keys that it has in a scene file, bodies by name; places and directions are in the body's frame. A "spring", with a damper
+    /// Adds a force by its kind and the keys that it has in a scene file, bodies by name or number; places and directions are in the body's frame. A "spring", with a damper
     /// beside it, joins the point `at` (m) of `body` and `to_at` of the body `to` (default: of the world): `stiffness`
     /// in N/m, `rest_length` in m, `damping` in N s/m. "lubrication" is what viscous water does in thin gaps, between all surfaces or in the gaps of `bodies` (names):
     /// their `roughness` in m, the `viscosity` in Pa s, and `reach` in m, the distance at which the pressure has fallen to that in the open.
@@ -193,8 +218,13 @@ impl Scene {
     ) -> PyResult<()> {
         let given = PyDict::new(py);
         for (key, value) in fields.into_iter().flatten() {
+            let name = key.extract::<String>()?;
             match value.extract::<PyRef<'_, Motion>>() {
                 Ok(motion) => given.set_item(key, motion.keys(py)?)?,
+                // A name may be that of a body to come.
+                Err(_) if OF_BODIES.contains(&name.as_str()) && value.is_instance_of::<PyInt>() => {
+                    given.set_item(key, self.named_body(kind, &name, &value)?)?;
+                }
                 Err(_) => given.set_item(key, value)?,
             }
         }
@@ -222,22 +252,7 @@ impl Scene {
         position: Option<&Bound<'_, PyAny>>,
         rotation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<usize> {
-        let named = match body.extract::<usize>() {
-            Ok(number) => self.0.bodies.get(number).map(|b| b.name.clone()),
-            Err(_) => body.extract::<String>().ok(),
-        };
-        let named = named
-            .filter(|name| self.0.body(name).is_some())
-            .ok_or_else(|| {
-                input(
-                    "site: body",
-                    body.to_string(),
-                    format!(
-                        "must be the number or name of a body: {:?}",
-                        self.body_names()
-                    ),
-                )
-            })?;
+        let named = self.named_body("site", "body", body)?;
         let site = Site::new(name, named)
             .at(or_zeros("site: position", position)?)
             .rotated(or_zeros("site: rotation", rotation)?);

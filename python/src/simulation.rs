@@ -417,16 +417,9 @@ impl Simulator {
         memory: f64,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(f64, Bound<'py, PyAny>)> {
-        if !(memory > 0.0 && memory.is_finite()) {
-            return Err(input(
-                "gradient_in_parts: memory",
-                memory,
-                "must be a number of bytes above zero",
-            ));
-        }
         let controls = self.controls("gradient_in_parts", controls, steps)?;
         let (inner, objective) = (self.inner.clone(), objective.0.clone());
-        let kept = Checkpoints::within(&inner, controls.steps(), memory);
+        let kept = Checkpoints::within(&inner, controls.steps(), memory).or_raise()?;
         let total = kept.work(controls.steps());
         let mut progress = Progress::new("gradient_in_parts: progress", progress, total)?;
         let made = followed(py, &mut progress, move |interrupt| {

@@ -189,6 +189,11 @@ pub fn jvp<'py>(
         array::to_python(py, values, &[&lead, &[states][..], inner].concat())
     };
     let nv = [rollout.simulator().system().tree.velocities()];
+    let nu = rollout.controls().nrows();
+    let applied = made.iter().flat_map(|t| t.applied_controls.iter().copied());
+    let applied: Vec<f64> = applied.collect();
+    let lead = if many { vec![count] } else { Vec::new() };
+    let applied = array::to_python(py, applied, &[&lead, &[states - 1, nu][..]].concat())?;
     let observed = |name: &str| stacked(&|t| &t.observables[name], &tangent_shape(rollout, name)?);
     let others = PyDict::new(py);
     for name in &observables {
@@ -199,6 +204,7 @@ pub fn jvp<'py>(
         stacked(&|t| &t.v, &nv)?,
         observed("positions")?,
         observed("rotations")?,
+        applied,
         others,
     );
     py.import("hydrograd._gradient")?

@@ -53,7 +53,7 @@ def scaled(case, factors):
 
 def rolled(on, case):
     def function(controls, q, v, factors):
-        return on.bridge.rollout(case.sim, controls, q, v, scaled(case, factors))[:4]
+        return on.bridge.rollout(case.sim, controls, q, v, scaled(case, factors))[:5]
 
     return function
 
@@ -123,7 +123,7 @@ def test_gradients_of_every_input(on, scene, function, request):
 def test_gradients_of_gains(on):
     sim = bridge_scenes.governed()
     controls = np.zeros((6, 1))
-    check(on, lambda gains: on.bridge.rollout(sim, controls, gains=gains)[:4], [np.array(sim.gains)], 1e-6)
+    check(on, lambda gains: on.bridge.rollout(sim, controls, gains=gains)[:5], [np.array(sim.gains)], 1e-6)
 
     def steps(gains):
         state = on.bridge.initial_state(sim)
@@ -156,10 +156,10 @@ def test_the_numbers_are_the_simulators(on, coupled):
     def run(controls, q, v):
         made = on.bridge.rollout(coupled.sim, controls, q, v)
         cost = sum((getattr(made, name) * on.array(seed)).sum() for name, seed in seeds.items())
-        return cost, made[:4]
+        return cost, made[:5]
 
     made, bars = on.differentiate(run, coupled.controls, coupled.q, coupled.v)
-    for name, array in zip(("positions", "rotations", "q", "v"), made, strict=True):
+    for name, array in zip(("positions", "rotations", "q", "v", "applied_controls"), made, strict=True):
         assert np.array_equal(array, getattr(right, name))
     gradient = right.vjp(**seeds)
     assert np.array_equal(bars[0], gradient.controls) and np.array_equal(bars[2], gradient.initial_v)
@@ -174,10 +174,10 @@ def test_a_batch_is_what_its_members_are(on, coupled):
         made = on.bridge.rollout(coupled.sim, controls, q, parameters={"ball.mass": mass})
         state = on.bridge.step(coupled.sim, (q, made.v[..., 0, :]), controls[..., 0, :], {"ball.mass": mass})
         cost = (made.positions**2).sum() + made.v.sum() + state.q.sum() + state.v.sum()
-        return cost, [*made[:4], *state]
+        return cost, [*made[:5], *state]
 
     whole, bars = on.differentiate(run, push, coupled.q, masses)
-    assert whole[0].shape == (2, 3, 5, 2, 3) and whole[4].shape == (2, 3, 8)
+    assert whole[0].shape == (2, 3, 5, 2, 3) and whole[4].shape == (2, 3, 4, 1) and whole[5].shape == (2, 3, 8)
     sum_q = np.zeros(8)
     for b in np.ndindex(2, 3):
         one, (controls, q, _) = on.differentiate(run, push[b], coupled.q, masses[b[1]])

@@ -191,3 +191,13 @@ def test_errors(sim):
     mpc = hg.optimize.Mpc(sim, TERMS, knots=5)
     with pytest.raises(hg.InputError, match="control: q"):
         mpc.control(0.0, np.zeros(3), np.zeros(6))
+
+
+def test_thrusters_without_a_slope_at_rest_are_moved():
+    scene = hg.Scene(hg.Fluid(1000.0), time_step=0.05)
+    scene.add(hg.Body(hg.sphere(0.1, faces=80), name="hull", density=1000.0, joint=hg.prismatic((1, 0, 0))))
+    scene.add_force("thruster", body="hull", direction=(1, 0, 0), polynomial=[0, 5.0], name="jet")
+    sim = hg.Simulator(scene)
+    terms = [cost.position("hull", (0.2, 0, 0), 50.0), cost.effort(1e-3)]
+    run = hg.optimize.Mpc(sim, terms, knots=15, hold=2, lower=-1, upper=1).run(sim, 80)
+    assert abs(run.rollout.positions[-1, 0, 0] - 0.2) < 0.01

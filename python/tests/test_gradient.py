@@ -104,6 +104,17 @@ def test_gains_of_the_scenes_controller():
     found = sim.rollout().gradient(goal).gains
     assert found.shape == sim.gains.shape == (3,)
     close(found, slopes(lambda g: sim.with_gains(g).rollout().value(goal), sim.gains, 1e-3))
+    # The effort of what it adds.
+    effort = hg.objective.applied_effort(0.5)
+    rollout = sim.rollout()
+    assert np.isclose(rollout.value(effort), 0.5 * np.sum(rollout.applied_controls**2), rtol=1e-14)
+    found = rollout.gradient(effort).gains
+    close(found, slopes(lambda g: sim.with_gains(g).rollout().value(effort), sim.gains, 1e-3))
+    by_hand = rollout.vjp(applied_controls=rollout.applied_controls)
+    assert np.array_equal(by_hand.gains, found)
+    tangents = rollout.jvp(gains=np.eye(3)).applied_controls
+    assert tangents.shape == (3, 8, 1)
+    close(np.sum(tangents * rollout.applied_controls, axis=(1, 2)), found)
     again = pickle.loads(pickle.dumps(sim.with_gains(2 * sim.gains)))
     assert np.array_equal(again.gains, 2 * sim.gains)
     with pytest.raises(hg.InputError, match="3 numbers"):

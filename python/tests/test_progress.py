@@ -117,6 +117,14 @@ def test_gradients_in_parts_are_followed(long_run):
         sim.gradient_in_parts(goal, controls, memory=1e6, progress=stop)
 
 
+def test_parts_need_some_memory(long_run):
+    sim, controls = long_run
+    goal = hg.objective.final_position(1, (0.0, 0.0, 0.0))
+    for memory in (-1.0, 1.0, 1e3, float("nan"), float("inf")):
+        with pytest.raises(hg.InputError, match=r"memory of a gradient in parts.*must be at least \d+"):
+            sim.gradient_in_parts(goal, controls, memory=memory)
+
+
 def test_failures_of_the_run_come_first_hand(sim, controls):
     with pytest.raises(hg.InputError, match="rollout: progress: got a value of type int"):
         sim.rollout(controls, progress=3)

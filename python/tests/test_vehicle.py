@@ -119,3 +119,18 @@ def test_loads_and_sensors():
         loads.wrenches("magic")
     with pytest.raises(hg.InputError, match="imu: site"):
         rollout.imu("nose")
+
+
+def test_forces_name_bodies_by_number_too():
+    scene = hg.Scene(hg.Fluid(1000.0))
+    scene.add(hg.Body(hg.sphere(0.1, faces=80), name="hull", mass=4.0))
+    scene.add(hg.Body(name="rotor", mass=1.0, inertia=(1e-3,) * 3, joint=hg.revolute((1, 0, 0))))
+    scene.add_force("thruster", body=0, direction=(1, 0, 0), rotor=1, time_constant=0.2, name="jet")
+    scene.add_force("spring", body="hull", to=1, stiffness=2.0)
+    text = scene.to_toml()
+    assert 'rotor = "rotor"' in text and 'to = "rotor"' in text and text.count('body = "hull"') == 2
+    with pytest.raises(hg.InputError, match=r"thruster: body.*got 2.*\[\"hull\", \"rotor\"\]"):
+        scene.add_force("thruster", body=2, direction=(1, 0, 0))
+    with pytest.raises(hg.InputError, match="pd.*none of the scene's is actuated"):
+        pd = '\n[controller]\nkind = "pd"\ntarget = []\nstiffness = []\ndamping = []\n'
+        hg.Simulator(hg.Scene.from_toml(text + pd))

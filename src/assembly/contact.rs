@@ -16,7 +16,7 @@ pub(super) const STIFFNESS: f64 = 10.0;
 const PLATE: f64 = 0.04;
 /// The same as [`STIFFNESS`] of what it weighs: ω Δt is no less than 1.6, and little comes back.
 const OF_PLATE: f64 = 2.5;
-/// How deep the heaviest moving body may rest in the gap at which surfaces touch, of that.
+/// How deep in the gap at which surfaces touch a body may rest that carries all that moves, of that.
 const SUNK: f64 = 0.5;
 /// Half the width over which the force sets in, of the smallest body's radius.
 const WIDTH: f64 = 0.004;
@@ -125,10 +125,10 @@ pub(super) fn assemble(
         true => bodies().map(film).fold(0.0, f64::max),
         false => 0.0,
     };
-    // Small bodies have a thin gap to rest in, however long the step is.
+    // Small bodies have a thin gap to rest in, however long the step is; and in a heap one may carry all others.
     let pressing =
         |b: usize| (parameters.mass(b) - parameters.density() * parameters.volume(b)).abs();
-    let load = bodies().map(pressing).fold(0.0, f64::max) * Vec3::from(scene.gravity).norm();
+    let load = bodies().map(pressing).sum::<f64>() * Vec3::from(scene.gravity).norm();
     let held = match gap > 0.0 {
         true => load / (SUNK * gap),
         false => 0.0,

@@ -78,6 +78,18 @@ impl System {
 }
 
 impl Evaluation<'_> {
+    /// What forces add as steps take them to what acts at an instant ([`ForceModel::ahead`]); user coordinates.
+    pub(crate) fn ahead(&self, v: &DVector<f64>, control: &DVector<f64>) -> DVector<f64> {
+        let tree = &self.system.tree;
+        let twists = tree.twists(&self.kinematics, v);
+        let at = self.moving(&twists, v, control);
+        let mut out = Loads::zeros(self.system.len(), v.len());
+        for force in self.system.forces.iter() {
+            force.ahead(&at, &mut out);
+        }
+        tree.project(&self.kinematics.columns, out.wrenches) + out.joints
+    }
+
     /// As those forces see joints that move by `v`: no body moves.
     fn joints<'b>(&'b self, v: &'b DVector<f64>, control: &'b DVector<f64>) -> Moving<'b> {
         self.moving(&[], v, control)

@@ -1,7 +1,7 @@
 //! How fast forces slow what moves, and how fast they swing it: what integrators that take them explicitly must resolve.
 //!
-//! g being the forces in the user's coordinates without the water's inertia, D = −∂g/∂v and K = −∂g/∂q at rest, both their symmetric parts on the coordinates that nothing drives, the rates are the
-//! eigenvalues of M^-½ D M^-½, and the angular frequencies the roots of those of M^-½ K M^-½. A step that moves by the velocity in which it has solved for D is stable while Δt² K < 4 (M + ½ Δt D): for it
+//! g being the forces in the user's coordinates without the water's inertia, D = −∂g/∂v and K = −∂g/∂q at rest, both on the coordinates that nothing drives, the rates are the real parts of the
+//! eigenvalues of M⁻¹ D, and the angular frequencies the roots of those of M⁻¹ K: what acts one way only, as a propeller's speed on a hull, makes none. A step that moves by the velocity in which it has solved for D is stable while Δt² K < 4 (M + ½ Δt D): for it
 //! M + ½ Δt D stands in place of M. Of many bodies that are coupled by products M is what each tree has alone.
 
 use super::fluid::FluidMomenta;
@@ -9,7 +9,11 @@ use super::force::{ForceModel, Loads, Velocity};
 use super::islands::Islands;
 use super::{Drive, Evaluation, Parameters, System};
 use crate::Result;
+use crate::solver::{growth, scaled_by};
 use nalgebra::{DMatrix, DVector};
+
+/// Part of a matrix' entries up to which its other half differs by rounding.
+const EVEN: f64 = 1e-9;
 
 /// The fastest of rates, or of angular frequencies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,15 +112,12 @@ impl System {
             let own: Vec<usize> = (0..island.len())
                 .filter(|k| free[island[*k]].is_some())
                 .collect();
-            let block = |m: &DMatrix<f64>| {
-                let m = m.select_rows(&own).select_columns(&own);
-                0.5 * (&m + m.transpose())
-            };
+            let block = |m: &DMatrix<f64>| m.select_rows(&own).select_columns(&own);
             let (of, by) = (block(&of), block(&by));
             if of.iter().all(|x| *x == 0.0) {
                 continue;
             }
-            let (rate, at) = largest(by, &of).ok_or(Indefinite)?;
+            let (rate, at) = largest(0.5 * (&by + by.transpose()), &of).ok_or(Indefinite)?;
             if found.is_none_or(|other| rate > other.rate) {
                 let body = free[island[own[at]]];
                 found = body.map(|body| Fastest { rate, body });
@@ -212,15 +213,14 @@ impl Evaluation<'_> {
     }
 }
 
-/// The largest eigenvalue of M^-½ S M^-½, and the coordinate that is most of its direction; none where M isn't positive definite.
+/// The largest real part of the eigenvalues of M⁻¹ S, and the coordinate that is most of its direction, or its own largest; none where M isn't positive definite.
 fn largest(m: DMatrix<f64>, s: &DMatrix<f64>) -> Option<(f64, usize)> {
-    let lower = m.cholesky()?.unpack();
-    let half = lower.solve_lower_triangular(s)?;
-    let scaled = lower.solve_lower_triangular(&half.transpose())?;
-    if !scaled.iter().all(|x| x.is_finite()) {
-        return None;
+    let scaled = scaled_by(&m.cholesky()?.unpack(), s)?;
+    if (&scaled - scaled.transpose()).amax() > EVEN * scaled.amax() {
+        let at = scaled.diagonal().imax();
+        return Some((growth(scaled), at));
     }
-    let found = (0.5 * (&scaled + scaled.transpose())).symmetric_eigen();
-    let k = found.eigenvalues.imax();
-    Some((found.eigenvalues[k], found.eigenvectors.column(k).iamax()))
+    let even = (0.5 * (&scaled + scaled.transpose())).symmetric_eigen();
+    let k = even.eigenvalues.imax();
+    Some((even.eigenvalues[k], even.eigenvectors.column(k).iamax()))
 }

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! M holds the water; h is what is left: Coriolis and centrifugal terms of bodies and water, gravity, buoyancy, drag, springs, less the controls u. Contact and stops of
-//! joints, which a step solves ([`Integrator::solves_contact`](crate::dynamics::Integrator::solves_contact)), aren't in it, nor are dampers solved with them.
+//! joints, which a step solves ([`Integrator::solves_contact`](crate::dynamics::Integrator::solves_contact)), aren't in it, nor are dampers solved with them. Servos
+//! pull as they do at an instant, k (u − q) − c q̇, whatever the time step by which they look ahead in steps.
 
 use super::Simulator;
 use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, linear, point_velocity, point_wrench, six};
@@ -138,7 +139,7 @@ impl Equations<'_> {
     /// Wrong lengths, and a solve of the coupling.
     pub fn bias_force(&self, v: &DVector<f64>, control: &DVector<f64>) -> Result<DVector<f64>> {
         self.check(v, control)?;
-        Ok(-self.at.inertial_force(v, control)?)
+        Ok(self.at.ahead(v, control) - self.at.inertial_force(v, control)?)
     }
 
     /// Forward dynamics, v̇ at further generalised forces `force` (τ). Joints that a motion drives, or that are locked, keep the acceleration that they have in

@@ -22,6 +22,8 @@ pub struct Cotangents {
     pub rotations: DMatrix<f64>,
     /// Direct dependence on the open-loop controls, controls × N.
     pub controls: DMatrix<f64>,
+    /// Of the controls that acted, controls × N: the open-loop ones and what the controller added.
+    pub applied_controls: DMatrix<f64>,
     /// Direct dependence on the water's density, as the readings of pressure sensors have it.
     pub density: f64,
     /// Of any [`super::observable`] that has a transpose, by its name: its tangents × (N + 1).
@@ -37,6 +39,7 @@ impl Cotangents {
             positions: DMatrix::zeros(3 * bodies, steps + 1),
             rotations: DMatrix::zeros(3 * bodies, steps + 1),
             controls: DMatrix::zeros(controls, steps),
+            applied_controls: DMatrix::zeros(controls, steps),
             density: 0.0,
             observables: BTreeMap::new(),
         }
@@ -49,6 +52,7 @@ impl Cotangents {
         self.positions += &other.positions;
         self.rotations += &other.rotations;
         self.controls += &other.controls;
+        self.applied_controls += &other.applied_controls;
         self.density += other.density;
         for (name, bars) in &other.observables {
             match self.observables.get_mut(name) {

@@ -96,6 +96,8 @@ enum Of {
     Pressure(Sensor),
     /// All open-loop controls, against zero.
     Controls,
+    /// All controls that acted, against zero.
+    AppliedControls,
 }
 
 impl Add for Sum {
@@ -196,6 +198,11 @@ pub fn effort(weight: f64) -> Sum {
     at_end(Of::Controls, &[], weight)
 }
 
+/// `weight` times the sum of the squares of the controls that acted: the open-loop ones and what the controller added, so that its gains have a share in it.
+pub fn applied_effort(weight: f64) -> Sum {
+    at_end(Of::AppliedControls, &[], weight)
+}
+
 impl Sum {
     /// All terms times `factor`.
     pub fn scaled(mut self, factor: f64) -> Self {
@@ -206,11 +213,17 @@ impl Sum {
     }
 }
 
+impl Of {
+    /// Whether it is of steps, not of states.
+    fn is_of_controls(&self) -> bool {
+        matches!(self, Self::Controls | Self::AppliedControls)
+    }
+}
+
 impl Sum {
     /// Its terms as far as a part of a run has them, to be taken of the part alone.
     fn of_part(&self, part: &Part) -> Self {
-        let here =
-            |term: &&Term| matches!(term.of, Of::Controls) || !term.last_only || part.is_last();
+        let here = |term: &&Term| term.of.is_of_controls() || !term.last_only || part.is_last();
         let terms = self.0.iter().filter(here).map(|term| Term {
             own: Some((part.states().len(), part.steps + 1)),
             ..term.clone()
@@ -272,7 +285,7 @@ impl Term {
                     .map(|(x, goal)| x - goal)
                     .collect();
             }
-            Of::Controls => return Vec::new(),
+            Of::Controls | Of::AppliedControls => return Vec::new(),
         };
         let found = observable(name).and_then(|o| Ok((o, o.value(&rollout.reading(n))?)));
         let miss = |(k, goal): (usize, &f64)| match &found {
@@ -362,7 +375,7 @@ impl Objective for Sum {
                         ));
                     }
                 }
-                Of::Controls => {}
+                Of::Controls | Of::AppliedControls => {}
             }
             let mut numbers = term.target.iter().chain([&term.weight]);
             if let Some(bad) = numbers.find(|x| !x.is_finite()) {
@@ -378,8 +391,12 @@ impl Objective for Sum {
 
     fn value(&self, rollout: &Rollout) -> f64 {
         let of = |term: &Term| {
-            if let Of::Controls = term.of {
-                return term.weight * rollout.controls().norm_squared();
+            match term.of {
+                Of::Controls => return term.weight * rollout.controls().norm_squared(),
+                Of::AppliedControls => {
+                    return term.weight * rollout.applied_controls().norm_squared();
+                }
+                _ => {}
             }
             let states = term.states(rollout);
             let count = term.count(rollout);
@@ -428,6 +445,10 @@ impl Objective for Sum {
                 }
                 Of::Controls => {
                     out.controls += 2.0 * term.weight * rollout.controls();
+                    continue;
+                }
+                Of::AppliedControls => {
+                    out.applied_controls += 2.0 * term.weight * rollout.applied_controls();
                     continue;
                 }
                 Of::Flow(_) | Of::Pressure(_) => continue,

@@ -12,6 +12,9 @@ use crate::dynamics::{State, StateBar};
 use crate::{Error, Result};
 use std::ops::ControlFlow;
 
+/// Fewest states that a limit of memory must have room for.
+pub const LEAST_STATES: usize = 4;
+
 /// What is kept of a long run at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Checkpoints {
@@ -32,16 +35,32 @@ impl Checkpoints {
     }
 
     /// The fewest steps made again within `bytes` of memory, half of them for the part and half for the states.
-    pub fn within(simulator: &Simulator, steps: usize, bytes: f64) -> Self {
+    ///
+    /// # Errors
+    /// Too few for a step and [`LEAST_STATES`] states: with one state every part would begin at the start again.
+    pub fn within(simulator: &Simulator, steps: usize, bytes: f64) -> Result<Self> {
         let tree = &simulator.system().tree;
         let numbers = tree.coordinates() + tree.velocities() + simulator.system().len();
-        let count = |size: f64| ((0.5 * bytes / size) as usize).max(1);
-        let part = count(simulator.step_bytes()).min(steps.max(1));
-        let parts = steps.div_ceil(part).max(1);
-        Self {
-            part,
-            states: count(200.0 + 8.0 * numbers as f64).min(parts),
+        let of_step = simulator.step_bytes();
+        let of_state = 200.0 + 8.0 * numbers as f64;
+        let least = 2.0 * of_step.max(LEAST_STATES as f64 * of_state);
+        if !(bytes >= least && bytes.is_finite()) {
+            return Err(Error::input(
+                "memory of a gradient in parts",
+                format!("{bytes} bytes"),
+                format!(
+                    "must be at least {:.0} for a scene of this size",
+                    least.ceil()
+                ),
+            ));
         }
+        let count = |size: f64| (0.5 * bytes / size) as usize;
+        let part = count(of_step).clamp(1, steps.max(1));
+        let parts = steps.div_ceil(part).max(1);
+        Ok(Self {
+            part,
+            states: count(of_state).clamp(1, parts),
+        })
     }
 
     /// Parts of a run of `steps` steps, the last one perhaps shorter.

@@ -358,6 +358,10 @@ impl Rollout {
             Seed {
                 q: c.q.column(n).into_owned(),
                 v: c.v.column(n).into_owned(),
+                control: match n < self.steps() {
+                    true => c.applied_controls.column(n).into_owned(),
+                    false => DVector::zeros(0),
+                },
                 observables: here.map(|(o, x)| (o, x.into_owned())).collect(),
             }
         };
@@ -379,6 +383,11 @@ impl Rollout {
             ("positions", &c.positions, z.positions.shape()),
             ("rotations", &c.rotations, z.rotations.shape()),
             ("controls", &c.controls, z.controls.shape()),
+            (
+                "applied_controls",
+                &c.applied_controls,
+                z.applied_controls.shape(),
+            ),
         ];
         for (name, x) in &c.observables {
             let rows = differentiable(name)?.tangents(self.simulator.system());

@@ -19,7 +19,7 @@ pub struct Sample {
     pub poses: Vec<Pose>,
     /// Kinetic energy of bodies and fluid, J.
     pub kinetic_energy: f64,
-    /// Potential energy of weight and buoyancy, J.
+    /// Potential energy of weight, buoyancy, springs, joints and tendons (those at the control 0), J.
     pub potential_energy: f64,
     /// Total momentum and angular momentum about the world origin, bodies and fluid.
     pub momentum: Vec6,

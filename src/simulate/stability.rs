@@ -55,7 +55,7 @@ impl Simulator {
         let damping = found.ok().flatten()?;
         let name = &system.bodies[damping.body].name;
         Some(format!(
-            "drag or damping slows body {name:?} at the rate {:.3e} 1/s at t = {} s: {:.3} times in the time step of {dt} s, where the integrator {:?}, which takes it \
+            "drag, damping or a servo slows body {name:?} at the rate {:.3e} 1/s at t = {} s: {:.3} times in the time step of {dt} s, where the integrator {:?}, which takes it \
              explicitly, is stable up to {limit} times: the run, or its gradient, may grow without bound; take a time step under {:.2e} s, or the integrator midpoint",
             damping.rate,
             readable(time),

@@ -33,6 +33,8 @@ pub(super) struct StepMap {
     pub conserved: DMatrix<f64>,
     /// Of q and y after it, 2nv × K.
     pub next: DMatrix<f64>,
+    /// Of the controls that act, controls × K.
+    pub applied: DMatrix<f64>,
 }
 
 impl Columns {
@@ -169,7 +171,7 @@ impl ControlledStep<'_, '_> {
             let [velocity, conserved] = columns.readout(t, e, record.state(), v)?;
             let mut control = columns.units(columns.of_controls());
             self.feed_back(columns, &at.q, &velocity, &mut control)?;
-            let inputs = columns.inputs(control, &chosen);
+            let inputs = columns.inputs(control.clone(), &chosen);
             let StateTangents { q, y } = self.step.jvp(&at, &velocity, &inputs)?;
             let mut next = DMatrix::zeros(2 * q.nrows(), q.ncols());
             next.rows_mut(0, q.nrows()).copy_from(&q);
@@ -178,6 +180,7 @@ impl ControlledStep<'_, '_> {
                 velocity,
                 conserved,
                 next,
+                applied: control,
             })
         };
         run().map_err(|e: crate::Error| e.at_time(time))

@@ -24,6 +24,8 @@ pub(super) struct Trajectory<'a> {
 pub(super) struct Seed {
     pub q: DVector<f64>,
     pub v: DVector<f64>,
+    /// Of the controls that acted from there on; empty at the end.
+    pub control: DVector<f64>,
     /// Of other observables.
     pub observables: Vec<(&'static dyn Differentiable, DVector<f64>)>,
 }
@@ -32,7 +34,8 @@ impl Seed {
     /// Its largest number.
     pub fn size(&self) -> f64 {
         let others = self.observables.iter().flat_map(|(_, x)| x.iter());
-        let all = self.q.iter().chain(self.v.iter()).chain(others);
+        let own = [&self.q, &self.v, &self.control];
+        let all = own.into_iter().flatten().chain(others);
         all.fold(0.0, |most, x| most.max(x.abs()))
     }
 }
@@ -235,7 +238,7 @@ impl<'a> ControlledStep<'_, 'a> {
     pub fn vjp(&self, next_bar: &StateBar, seed: &Seed) -> Result<(StateBar, Partial)> {
         let record = self.step.record();
         let run = || {
-            let (mut bar, gains) = self.transpose(next_bar)?;
+            let (mut bar, gains) = self.transpose(next_bar, &seed.control)?;
             let e = self.step.linearisation();
             self.trajectory
                 .observe_vjp(e, record.state(), record.velocity(), seed, &mut bar)?;
@@ -244,10 +247,15 @@ impl<'a> ControlledStep<'_, 'a> {
         run().map_err(|e: Error| e.at_time(self.trajectory.stepper.time(record.state())))
     }
 
-    /// Transpose of the step and its controller; what there is of the velocity's cotangent isn't carried on yet.
-    fn transpose(&self, next_bar: &StateBar) -> Result<(StepBar, Vec<f64>)> {
+    /// Transpose of the step and its controller, with a cotangent of the controls that acted; what there is of the velocity's cotangent isn't carried on yet.
+    fn transpose(
+        &self,
+        next_bar: &StateBar,
+        applied: &DVector<f64>,
+    ) -> Result<(StepBar, Vec<f64>)> {
         let (t, record) = (self.trajectory, self.step.record());
         let mut bar = self.step.vjp(next_bar)?;
+        bar.control += applied;
         let state = record.state();
         let seen = observation(&t.stepper, state, record.velocity());
         let policy = t.simulator.policy();

@@ -2,7 +2,7 @@
 
 use super::Columns;
 use crate::adjoint::sample;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, linalg::Schur};
 
 /// Most and least steps of an estimate.
 const STEPS: usize = 24;
@@ -60,5 +60,58 @@ pub fn condition(largest: f64, inverse: f64) -> f64 {
         condition
     } else {
         f64::INFINITY
+    }
+}
+
+/// Steps of the QR iteration, for each row, within which Schur's form is found.
+const ROTATIONS: usize = 100;
+
+/// L⁻¹ S L⁻ᵀ, which has the eigenvalues of M⁻¹ S, M = L Lᵀ. None where numbers aren't finite.
+pub fn scaled_by(lower: &DMatrix<f64>, s: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let half = lower.solve_lower_triangular(s)?;
+    let scaled = lower.solve_lower_triangular(&half.transpose())?.transpose();
+    scaled.iter().all(|x| x.is_finite()).then_some(scaled)
+}
+
+/// The largest real part of the eigenvalues of a square matrix: the rate at which ẋ = A x grows in the end. That of its symmetric part bounds it, and says how fast x may grow
+/// at first: of what acts one way only, as a propeller's speed on a hull, as fast as one likes to scale it.
+pub fn growth(a: DMatrix<f64>) -> f64 {
+    let n = a.nrows();
+    let bound = (0.5 * (&a + a.transpose())).symmetric_eigenvalues().max();
+    let Some(schur) = Schur::try_new(a, f64::EPSILON, ROTATIONS * n) else {
+        return bound;
+    };
+    let parts = schur.complex_eigenvalues();
+    parts
+        .iter()
+        .fold(f64::NEG_INFINITY, |most, x| most.max(x.re))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::dmatrix;
+
+    #[test]
+    fn growth_is_that_in_the_end() {
+        // One way: its symmetric part grows at 500.
+        assert!((growth(dmatrix![-1.0, 1000.0; 0.0, -2.0]) + 1.0).abs() < 1e-9);
+        // A swing that grows: 0.3 ± 2 i.
+        assert!((growth(dmatrix![0.3, 2.0; -2.0, 0.3]) - 0.3).abs() < 1e-12);
+        let a = dmatrix![2.0, 0.4, 0.1; 0.4, 1.0, 0.3; 0.1, 0.3, -1.0];
+        let most = a.clone().symmetric_eigenvalues().max();
+        assert!((growth(a) - most).abs() < 1e-12);
+    }
+
+    #[test]
+    fn scaled_matrices_keep_eigenvalues() {
+        let m = dmatrix![2.0, 0.5; 0.5, 1.0];
+        let s = dmatrix![0.7, -3.0; 1.0, 0.2];
+        let factor = m.cholesky().unwrap();
+        let scaled = scaled_by(&factor.l(), &s).unwrap();
+        let plain = factor.inverse() * &s;
+        assert!((scaled.trace() - plain.trace()).abs() < 1e-12);
+        assert!((scaled.determinant() - plain.determinant()).abs() < 1e-12);
+        assert!(scaled_by(&dmatrix![1e-200], &dmatrix![1.0]).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! The grasp: lost by the naive push in water, caught on dry land, and caught in water by forces that a descent finds.
+//! The grasp: gradients of its costs, and random ones. That a descent catches what the naive push loses is tested with the paper's first figure (`--example paper`).
 
 #[allow(dead_code)]
 #[path = "../../examples/grasp/hold.rs"]
@@ -12,29 +12,6 @@ use hydrograd::Controls;
 use hydrograd::adjoint::sample::Samples;
 use hydrograd::simulate::OpenLoop;
 use task::Task;
-
-#[test]
-fn the_naive_push_catches_on_dry_land_and_loses_in_water() {
-    let scene = task::load().unwrap();
-    for (scene, caught) in [(task::dry(&scene), true), (scene, false)] {
-        let simulator = task::simulator(&scene, task::CHEAP).unwrap();
-        let rollout = task::run(&simulator, scene.steps).unwrap();
-        assert_eq!(hold::caught(&rollout).unwrap(), caught);
-    }
-}
-
-#[test]
-fn a_descent_finds_forces_that_catch_the_coin() {
-    let scene = task::load().unwrap();
-    let simulator = task::simulator(&scene, task::CHEAP).unwrap();
-    let naive = task::run(&simulator, scene.steps).unwrap();
-    let task = Task::new(&scene, task::CHEAP).unwrap();
-    let start = task.through(&naive).unwrap();
-    let before = task.cost(&start).unwrap();
-    let found = task.find(&start, |_, _| {}).unwrap();
-    assert!(found.cost < 0.1 * before, "{} from {before}", found.cost);
-    assert!(hold::caught(&task.rollout(&found.x).unwrap()).unwrap());
-}
 
 /// The costs' gradients over the knots, against differences: before the fingers touch the coin, and with the coin held.
 #[test]

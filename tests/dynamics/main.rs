@@ -1,5 +1,6 @@
 //! Motion: what it conserves, its gradients, how runs are resumed and ended, and descent on them.
 
+mod applied;
 mod balance;
 mod ballast;
 #[cfg(feature = "opt")]

@@ -5,7 +5,7 @@
 use crate::support::{INTEGRATORS, example, says, simulator};
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{BodyId, Drag, DragPart};
-use hydrograd::simulate::{Checkpoints, Partwise};
+use hydrograd::simulate::{Checkpoints, LEAST_STATES, Partwise};
 use hydrograd::{
     Body, Controls, Error, Fidelity, Fluid, Gradient, Scene, Settings, Shape, Simulator, objective,
 };
@@ -77,12 +77,20 @@ fn gradients_in_parts_are_the_whole_ones_to_the_bit() {
 #[test]
 fn checkpoints_fit_what_they_are_given() {
     let simulator = simulator(&example("coins"), Fidelity::Isolated, Integrator::Rk4);
-    for bytes in [1.0, 1e4, 1e6, 1e12] {
-        let kept = Checkpoints::within(&simulator, 100_000, bytes);
+    for bytes in [1e5, 1e6, 1e12] {
+        let kept = Checkpoints::within(&simulator, 100_000, bytes).unwrap();
         assert!(kept.part >= 1 && kept.states >= 1);
         assert!(kept.part <= 100_000 && (kept.states - 1) * kept.part < 100_000);
+        assert!(bytes > 1e11 || kept.states >= LEAST_STATES);
     }
-    assert_eq!(Checkpoints::within(&simulator, 100_000, 1e12).part, 100_000);
+    let all = Checkpoints::within(&simulator, 100_000, 1e12).unwrap();
+    assert_eq!((all.part, all.states), (100_000, 1));
+    // With one state each part would begin at the start again.
+    for bytes in [1.0, 1e3, f64::NAN, f64::INFINITY] {
+        let error = Checkpoints::within(&simulator, 100_000, bytes).unwrap_err();
+        let bytes = format!("{bytes} bytes");
+        says(error, &["memory of a gradient", &bytes, "at least"]);
+    }
     assert_eq!(
         Checkpoints::new(100),
         Checkpoints {

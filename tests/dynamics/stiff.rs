@@ -3,7 +3,7 @@
 use crate::support::INTEGRATORS;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{
-    Body, Drag, DragPart, Fluid, Joint, Passive, Scene, Servo, Shape, Spring, Tendon,
+    Body, Drag, DragPart, Fluid, Joint, Passive, Scene, Servo, Shape, Spring, Tendon, Thruster,
 };
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 
@@ -194,4 +194,40 @@ fn implicit_damping_and_servos_bear_stiffer_springs() {
     let sim = made(slide("a").actuated().servo(servo));
     assert_eq!(sim.start_stiffness_warning(), None);
     assert!(grown(&sim) < 1.0);
+}
+
+/// A rotor that lags by 0.2 s, and pushes a hull on which it isn't: a time constant of 0.2 s is what there is to resolve, however small the rotor's inertia, in which no equation has it. Not told, and not cut.
+#[test]
+fn what_acts_one_way_only_is_not_stiff() {
+    let axis = [1.0, 0.0, 0.0];
+    for inertia in [30.0, 1e-3, 1e-5, 1e-9] {
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.add(Body::new(Shape::sphere(0.1)).named("hull").mass(4.0));
+        let rotor = Body::dry().named("rotor").mass(1.0).inertia([inertia; 3]);
+        scene.add(rotor.joint(Joint::Revolute { axis }));
+        let thruster = Thruster::new("hull").direction(axis).polynomial([40.0]);
+        scene.add_force(thruster.rotor("rotor", 0.2).into());
+        for integrator in INTEGRATORS {
+            let simulator = simulator(&scene, integrator, 0.05);
+            let warned = simulator.start_stiffness_warning();
+            assert_eq!(warned, None, "{integrator:?}, {inertia}");
+            let ones = nalgebra::DMatrix::from_element(1, 100, 1.0);
+            let controls = Controls::from_matrix(&simulator, ones).unwrap();
+            let rollout = simulator.rollout(&controls).unwrap();
+            assert_eq!(rollout.summary().cut_steps, 0, "{integrator:?}, {inertia}");
+            // n = 1 − e^(−t/T), by the method's own error of its step.
+            let off = rollout.samples().iter().map(|s| {
+                let exact = 1.0 - (-s.time / 0.2).exp();
+                (s.v[6] - exact).abs()
+            });
+            let off = off.fold(0.0, f64::max);
+            println!("{integrator:?}, J = {inertia}: n off by {off:.1e}");
+            let most = match integrator {
+                Integrator::Rk4 => 1e-4,
+                Integrator::Rk2 | Integrator::Midpoint => 5e-3,
+                _ => 0.06,
+            };
+            assert!(off < most, "{integrator:?}, {inertia}: {off}");
+        }
+    }
 }

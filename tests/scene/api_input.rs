@@ -2,7 +2,7 @@
 
 use crate::support::{example, says};
 use hydrograd::dynamics::Integrator;
-use hydrograd::scene::{Body, Fluid, Joint, Motion, Preset, Scene};
+use hydrograd::scene::{Body, Fluid, Joint, Motion, Preset, Scene, Servo};
 use hydrograd::simulate::{Action, ActionBar, Method, Observation, Policy};
 use hydrograd::{Controls, Error, Fidelity, Result, Settings, Simulator, objective};
 use nalgebra::DVector;
@@ -387,4 +387,28 @@ fn equations_of_motion_check_lengths() {
         &["acceleration"],
     );
     assert!(equations.force(&right, &right, &none).is_ok());
+}
+
+/// A servo looks ahead by a step in steps; what acts at an instant knows of none.
+#[test]
+fn equations_of_motion_know_no_time_step() {
+    let axis = [0.0, 0.0, 1.0];
+    for time_step in [1e-6, 0.01, 0.05] {
+        let mut scene = Scene::new(Fluid::none());
+        scene.time_step = time_step;
+        let arm = Body::dry().named("arm").mass(1.0).inertia([0.02; 3]);
+        let arm = arm.joint(Joint::Revolute { axis }).actuated();
+        scene.add(arm.servo(Servo::new(10.0, 0.5)));
+        let simulator = Simulator::new(&scene, Settings::default()).unwrap();
+        let equations = simulator.equations(&DVector::from_element(1, 0.2)).unwrap();
+        let one = |x| DVector::from_element(1, x);
+        let found = equations.acceleration(&one(1.5), &one(0.3), &one(0.0), &one(0.0));
+        let exact = (10.0 * (0.3 - 0.2) - 0.5 * 1.5) / 0.02;
+        assert!(
+            (found.unwrap()[0] / exact - 1.0).abs() < 1e-12,
+            "{time_step}"
+        );
+        let force = equations.force(&one(1.5), &one(exact), &one(0.3)).unwrap();
+        assert!(force[0].abs() < 1e-12, "{time_step}: {force}");
+    }
 }

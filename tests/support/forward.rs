@@ -44,6 +44,7 @@ fn cotangents(rollout: &Rollout, seed: u64) -> Cotangents {
         &mut out.positions,
         &mut out.rotations,
         &mut out.controls,
+        &mut out.applied_controls,
     ] {
         *part = fill(part.nrows(), part.ncols());
     }
@@ -69,6 +70,7 @@ pub fn gap(rollout: &Rollout) -> f64 {
             w.positions.component_mul(&t.observables["positions"]),
             w.rotations.component_mul(&t.observables["rotations"]),
             w.controls.component_mul(&d.controls),
+            w.applied_controls.component_mul(&t.applied_controls),
         ];
         for (name, w) in &w.observables {
             terms.push(w.component_mul(&t.observables[name]));

@@ -337,6 +337,9 @@ pub trait ForceModel: Send + Sync {
         }
     }
 
+    /// Adds what [`ForceModel::add`] has that isn't there at an instant: a servo looks ahead by a time step.
+    fn ahead(&self, _at: &Moving, _out: &mut Loads) {}
+
     /// Whether it acts on joints with one coordinate alone, each by its own coordinate and velocity, and may resist them so stiffly that the mean velocity of a step won't do for it
     /// (`dynamics::late`).
     fn is_late(&self) -> bool {

@@ -98,6 +98,13 @@ impl ForceModel for Servos {
         }
     }
 
+    fn ahead(&self, at: &Moving, out: &mut Loads) {
+        for s in &self.each {
+            let stiffness = at.place.parameters[s.stiffness];
+            out.joints[s.v] -= stiffness * self.time_step * at.v[s.v];
+        }
+    }
+
     fn is_late(&self) -> bool {
         true
     }

@@ -4,10 +4,11 @@
 //! step ends in, v* = M(q⁺)⁻¹ p*, and the velocities v₀ at its start, v before contact and v_e with which it acts, the defect is
 //!
 //! ```text
-//! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v*) − ½ Δt g(q, v_e)ᵀ (v + v_e)
+//! δ = ½ v*ᵀ M(q⁺) v* − ½ v₀ᵀ M(q) v₀ − ½ Δt F(q, v)ᵀ (v₀ + v + v* − v_e) − ½ Δt g(q, v_e)ᵀ (v + v_e)
 //! ```
 //!
-//! F being all forces but the water's inertia, g those of contact, with what resists motion otherwise than at v; all velocities relative to the drift where there is a current ([`crate::dynamics::Drift`]). It is zero where the inertia stays what it is, whatever acts. It is taken out of e = v* − B ω, the motion
+//! F being all forces but the water's inertia, g those of contact, with what resists motion otherwise than at v; all velocities relative to the drift where there is a current ([`crate::dynamics::Drift`]). It is zero where the inertia stays what it is, whatever acts:
+//! forces take v₀ to v then, contact v to v_e = v*. It is taken out of e = v* − B ω, the motion
 //! but for the rigid one B ω of all bodies together that nothing in the water or the joints stands against ([`System::symmetric`](crate::dynamics::System)), which holds
 //! the momentum along B:
 //!
@@ -79,6 +80,11 @@ impl Drifting {
             acting: velocities.acting() - w,
         }
     }
+
+    /// v₀ + v + v* − v_e: twice the mean velocity that forces do work at in a step that ends at v*; where nothing presses v₀ + v*.
+    fn path(&self, end: &DVector<f64>) -> DVector<f64> {
+        &self.start + end + (&self.before - &self.acting)
+    }
 }
 
 /// All that the correction consists of.
@@ -149,7 +155,8 @@ impl Parts {
         }
         let loads = e.user_loads(&velocities.before, &start.input.control);
         let first = &drifting.start;
-        let mut defect = kinetic - e.mass_energy(first) - 0.5 * s.dt * loads.dot(&(first + &v));
+        let path = drifting.path(&v);
+        let mut defect = kinetic - e.mass_energy(first) - 0.5 * s.dt * loads.dot(&path);
         let contact = near
             .contact_acts(&velocities.before)
             .then(|| reaction.force(velocities.acting(), Dual::User));
@@ -343,11 +350,13 @@ impl<'a> Closure<'a> {
             &mut at_end,
         )?;
         hat_star_bar += &at_end.state.y;
-        let along = half * (first + &parts.v);
+        let along = half * drifting.path(&parts.v);
         let work = e.user_loads_vjp(&velocities.before, &start.input.control, &along);
         bar.add(-defect_bar, &work);
-        out.velocities[0] -= defect_bar * &work.v;
-        bar.v -= defect_bar * half * &parts.loads;
+        let worked = defect_bar * half * &parts.loads;
+        out.velocities[0] -= defect_bar * &work.v + &worked;
+        out.velocities[1] += &worked;
+        bar.v -= worked;
         // The energy at the start.
         bar.v -= defect_bar * e.mass_times(first);
         bar.add(-0.5 * defect_bar, &e.mass_vjp(first, first)?);

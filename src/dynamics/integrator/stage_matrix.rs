@@ -7,6 +7,7 @@ use crate::adjoint::solve::Definite;
 use crate::dynamics::Linearisation;
 use crate::dynamics::island_matrix::IslandMatrix;
 use crate::dynamics::slopes::columns;
+use crate::solver::{growth, scaled_by};
 use nalgebra::{DMatrix, DVector};
 
 /// Largest part by which the inertia may change in the time of a stage.
@@ -34,9 +35,10 @@ pub(super) fn stage_matrix(
 
 /// How many times too long a step is for its implicit stage; none where it isn't.
 ///
-/// With W = h ∂f/∂v on the free rows, the stage's matrix is M − W but for what turning adds, and κ the largest eigenvalue of
-/// M^-½ ½(W + Wᵀ) M^-½: the part by which the inertia M changes in the time h of what moves relative to the water, less what damps. In one coordinate it is
-/// h v M′/M, and there is no solution from κ = ½ on. Up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations of each island.
+/// With W = h ∂f/∂v on the free rows, the stage's matrix is M − W but for what turning adds, and κ the largest real part of the eigenvalues of
+/// M⁻¹ W: the part by which the inertia M changes in the time h of what moves relative to the water, less what damps. In one coordinate it is
+/// h v M′/M, and there is no solution from κ = ½ on. The largest eigenvalue of M^-½ ½(W + Wᵀ) M^-½ is no smaller: up to ¼ a factor of ¼ M − ½(W + Wᵀ) is all that it takes, n³/3 operations of each
+/// island.
 pub(super) fn excess(
     e: &Linearisation,
     split: &Split,
@@ -65,18 +67,14 @@ pub(super) fn excess(
 
 /// The same of the velocities of an island.
 fn own_excess(grown: DMatrix<f64>, m: DMatrix<f64>) -> Option<usize> {
-    let grown = 0.5 * (&grown + grown.transpose());
-    if grown.is_empty() || Definite::new(CHANGE * &m - &grown).is_some() {
+    let even = 0.5 * (&grown + grown.transpose());
+    if grown.is_empty() || Definite::new(CHANGE * &m - even).is_some() {
         return None;
     }
     let lower = m.cholesky()?.unpack();
-    let half = lower.solve_lower_triangular(&grown)?;
-    let scaled = lower.solve_lower_triangular(&half.transpose())?;
-    let change = match scaled.iter().all(|x| x.is_finite()) {
-        true => (0.5 * (&scaled + scaled.transpose()))
-            .symmetric_eigenvalues()
-            .max(),
-        false => f64::INFINITY,
+    let change = match scaled_by(&lower, &grown) {
+        Some(scaled) => growth(scaled),
+        None => f64::INFINITY,
     };
-    Some((change / CHANGE).ceil().clamp(2.0, MOST as f64) as usize)
+    (change > CHANGE).then(|| (change / CHANGE).ceil().clamp(2.0, MOST as f64) as usize)
 }

@@ -3,7 +3,7 @@
 //! A trajectory is linearised knot by knot (the simulator's own Jacobians of steps, [`Rollout::step_jacobians`], chained over the steps of a knot; the cost by Gauss and Newton), a
 //! sweep from the last knot to the first finds the controls that are best by that model, within their limits (a projected Newton step at each knot), and how they answer to changes
 //! of the state; the simulator then runs with them. A step that doesn't lower the cost as it should is halved; where none does, or one of an eighth at most, the model is regularised. Derivatives of second
-//! order of the dynamics are left out. States are compared on their manifold (`x ⊖ x̄`): free bodies turn as they like.
+//! order of the dynamics are left out. Controls that have no slope where they are, as thrusters at rest, have the one that they have farther off. States are compared on their manifold (`x ⊖ x̄`): free bodies turn as they like.
 //!
 //! A scene's own controller acts as always; the controls here are the open-loop ones, to which it adds. The numbers don't depend on the number of threads.
 //!
@@ -16,10 +16,12 @@
 
 mod backward;
 mod box_qp;
+mod idle;
 mod plan;
 mod problem;
 mod settings;
 mod tracking;
+mod trust;
 
 pub use plan::{Guess, Plan};
 pub use problem::Problem;
@@ -37,17 +39,12 @@ use problem::Run;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::time::Instant;
+use trust::Trust;
 
 /// Part of the expected fall of the cost that a step must bring.
 const ARMIJO: f64 = 1e-4;
 /// Trials that are made side by side once a whole step is refused. Fixed, so that what is found doesn't depend on the number of threads.
 const BESIDE: usize = 3;
-/// The regularisation that follows on none, and its growth.
-const LEAST: f64 = 1e-6;
-const GROWTH: f64 = 10.0;
-/// Part of a step from which on the model is trusted more, and up to which less: one that is cut again and again tells that states turn away from it.
-const TRUSTED: f64 = 0.5;
-const DOUBTED: f64 = 0.125;
 /// Part of the cost below which a fall is rounding.
 const ROUNDING: f64 = 1e-14;
 
@@ -67,6 +64,8 @@ struct Model {
     knots: Vec<KnotModel>,
     last: super::cost::Quadratic,
     gradient: f64,
+    /// Knots and controls whose slopes are those that they have elsewhere.
+    lent: Vec<(usize, usize)>,
 }
 
 impl Model {
@@ -87,7 +86,25 @@ impl Model {
             knots,
             last,
             gradient,
+            lent: Vec::new(),
         })
+    }
+
+    /// The same, in which controls without a slope have the one that they have elsewhere.
+    fn lent(ready: &Ready, run: &Run) -> Result<Self> {
+        let mut out = Self::of(ready, run)?;
+        out.lent = idle::lend(ready, run, &mut out.knots)?;
+        Ok(out)
+    }
+
+    /// Takes the slopes that aren't its own back; whether there were any.
+    fn is_taken_back(&mut self) -> bool {
+        for (k, i) in &self.lent {
+            self.knots[*k].b.column_mut(*i).fill(0.0);
+        }
+        let any = !self.lent.is_empty();
+        self.lent.clear();
+        any
     }
 }
 
@@ -157,27 +174,26 @@ pub(super) fn solve(
     let mut watch = Watch(begun);
     let mut run = guess.run(ready, simulator, start)?;
     watch.lap(&mut times.rollouts);
-    let mut model = Model::of(ready, &run)?;
+    let mut model = Model::lent(ready, &run)?;
     watch.lap(&mut times.derivatives);
-    let mut regularisation = settings.regularisation;
+    let mut trust = Trust::new(settings);
     let mut costs = vec![run.cost];
     // Whether the model is this trajectory's, and whether all steps from here were refused so far.
     let (mut iterations, mut fresh, mut refused) = (0, true, false);
-    let grow = |mu: f64| (mu * GROWTH).max(LEAST);
     let is_reached = |cost: f64| settings.target.is_some_and(|target| cost <= target);
     let mut answers;
     let stop = loop {
         if !fresh {
-            model = Model::of(ready, &run)?;
+            model = Model::lent(ready, &run)?;
             fresh = true;
             watch.lap(&mut times.derivatives);
         }
         let sweep = loop {
-            let made = backward(&model.knots, &model.last, regularisation);
-            if made.is_some() || regularisation > settings.most_regularisation {
+            let made = backward(&model.knots, &model.last, trust.mu);
+            if made.is_some() || trust.is_gone() {
                 break made;
             }
-            regularisation = grow(regularisation);
+            trust.grow();
         };
         watch.lap(&mut times.sweeps);
         let Some(sweep) = sweep else {
@@ -191,7 +207,7 @@ pub(super) fn solve(
         if expected <= least {
             // Heavy regularisation makes any step small: what there is to gain tells a sweep without.
             let plain = || backward(&model.knots, &model.last, 0.0);
-            if regularisation == 0.0 || plain().is_some_and(|plain| plain.fall() <= least) {
+            if trust.mu == 0.0 || plain().is_some_and(|plain| plain.fall() <= least) {
                 break IlqrStop::Stationary;
             }
             if refused {
@@ -205,28 +221,21 @@ pub(super) fn solve(
             break IlqrStop::Budget;
         }
         iterations += 1;
-        let used = regularisation;
+        let used = trust.mu;
         let found = search(ready, simulator, start, &run, &sweep, settings.trials)?;
         watch.lap(&mut times.rollouts);
         let (part, fell) = match found {
             Some((part, next)) => {
                 let fell = run.cost - next.cost;
                 (run, fresh, refused) = (next, false, false);
-                if part >= TRUSTED {
-                    regularisation /= GROWTH;
-                    if regularisation < LEAST {
-                        regularisation = 0.0;
-                    }
-                } else if part <= DOUBTED {
-                    // What was accepted ends nothing.
-                    let most = settings.most_regularisation.max(regularisation);
-                    regularisation = grow(regularisation).min(most);
-                }
+                trust.accepted(part, fell);
                 (part, fell)
             }
             None => {
-                regularisation = grow(regularisation);
-                refused = true;
+                if !model.is_taken_back() {
+                    trust.refused();
+                    refused = true;
+                }
                 (0.0, f64::INFINITY)
             }
         };
@@ -245,7 +254,7 @@ pub(super) fn solve(
         if part == 1.0 && used == 0.0 && fell <= settings.tolerance * size {
             break IlqrStop::Cost;
         }
-        if regularisation > settings.most_regularisation {
+        if trust.is_gone() {
             break IlqrStop::Stuck;
         }
         if iterations == settings.iterations && !settings.last_gains {
@@ -257,9 +266,9 @@ pub(super) fn solve(
     };
     if !fresh && settings.last_gains {
         watch.lap(&mut times.rollouts);
-        model = Model::of(ready, &run)?;
+        model = Model::lent(ready, &run)?;
         watch.lap(&mut times.derivatives);
-        if let Some(sweep) = backward(&model.knots, &model.last, regularisation) {
+        if let Some(sweep) = backward(&model.knots, &model.last, trust.mu) {
             answers = sweep.answers;
         }
         watch.lap(&mut times.sweeps);
@@ -273,7 +282,7 @@ pub(super) fn solve(
         steps: answers.into_iter().map(|a| a.step).collect(),
         costs,
         gradient: model.gradient,
-        regularisation,
+        regularisation: trust.mu,
         iterations,
         stop,
         times,

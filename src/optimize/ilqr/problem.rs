@@ -3,7 +3,7 @@
 use super::backward::{Answer, KnotModel};
 use crate::error::in_order;
 use crate::optimize::cost::{Bound, Cost, CostPoint, Quadratic};
-use crate::simulate::{Cotangents, Objective, Rollout, Simulator};
+use crate::simulate::{Cotangents, Jacobians, Objective, Rollout, Simulator};
 use crate::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -247,6 +247,9 @@ impl Ready {
     }
 
     /// Every knot of a trajectory linearised, and the cost at its end.
+    ///
+    /// # Errors
+    /// Of the derivatives.
     pub(super) fn models(&self, run: &Run) -> Result<(Vec<KnotModel>, Quadratic)> {
         let costs = self.each_point(&run.rollout, &run.controls, |at| {
             self.cost.quadratic(at, self.duration)
@@ -254,12 +257,8 @@ impl Ready {
         let steps = run.rollout.step_jacobians(&[])?;
         let mut costs = costs.into_iter();
         let knots = steps.chunks(self.hold).zip(&mut costs).enumerate();
-        let of = |(k, (steps, cost)): (usize, (&[crate::simulate::Jacobians], Quadratic))| {
-            let (mut a, mut b) = (steps[0].state.clone(), steps[0].controls.clone());
-            for step in &steps[1..] {
-                a = &step.state * a;
-                b = &step.state * b + &step.controls;
-            }
+        let of = |(k, (steps, cost)): (usize, (&[Jacobians], Quadratic))| {
+            let (a, b) = chained(steps);
             let now = run.controls.column(k);
             let before = match k.checked_sub(1) {
                 None => self.previous.clone(),
@@ -316,6 +315,14 @@ impl Ready {
         }
         u
     }
+}
+
+/// The next knot's state by a knot's state, and by its controls, from its steps.
+pub(super) fn chained(steps: &[Jacobians]) -> (DMatrix<f64>, DMatrix<f64>) {
+    let first = (steps[0].state.clone(), steps[0].controls.clone());
+    steps[1..].iter().fold(first, |(a, b), step| {
+        (&step.state * a, &step.state * b + &step.controls)
+    })
 }
 
 /// Changes of (q, v) from one state to another, q in its tangent space: 2nv.

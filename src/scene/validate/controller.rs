@@ -69,6 +69,14 @@ impl Scene {
                     ));
                 }
                 // Thrusters and tendons among the forces get nothing from it.
+                if self.body_controls() == 0 {
+                    return Err(Error::input(
+                        "controller.kind",
+                        "pd",
+                        "it drives joints by forces, and none of the scene's is actuated; thrusters and tendons get nothing from it: use kind = \"constant\" or a controller of \
+                         your own",
+                    ));
+                }
                 counted("target", target, 0)?;
                 counted("stiffness", stiffness, 0)?;
                 counted("damping", damping, 0)

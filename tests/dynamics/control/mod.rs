@@ -1,6 +1,7 @@
 //! Optimal control: iLQR against what is known of linear systems, its limits, its feedback, tasks in water, and model-predictive control.
 
 mod errors;
+mod idle;
 mod linear;
 mod mpc;
 mod water;

@@ -10,7 +10,7 @@ use crate::mapping;
 use crate::robot::{self, Robot};
 use hydrograd::scene::{Site, Wall, WallSurface};
 use pyo3::prelude::*;
-use pyo3::types::{IntoPyDict, PyDict, PyInt};
+use pyo3::types::{IntoPyDict, PyBool, PyDict, PyString};
 use std::path::PathBuf;
 
 /// A force whose keys or values don't fit.
@@ -24,6 +24,11 @@ fn not_a_force(kind: &str, why: impl std::fmt::Display) -> PyErr {
 
 /// Keys of forces that name a body.
 const OF_BODIES: [&str; 3] = ["body", "to", "rotor"];
+
+/// Whether it is a name, or nothing.
+fn is_text(value: &Bound<'_, PyAny>) -> bool {
+    value.is_none() || value.is_instance_of::<PyString>()
+}
 
 /// As it is now: other threads may go on with the scene while something is made of it.
 pub fn copied(scene: &Bound<'_, Scene>) -> PyResult<hydrograd::Scene> {
@@ -48,6 +53,7 @@ impl Scene {
     /// The name of a body given by its number or its name, as `key` of `what`.
     fn named_body(&self, what: &str, key: &str, body: &Bound<'_, PyAny>) -> PyResult<String> {
         let named = match body.extract::<usize>() {
+            Ok(_) if body.is_instance_of::<PyBool>() => None,
             Ok(number) => self.0.bodies.get(number).map(|b| b.name.clone()),
             Err(_) => body.extract::<String>().ok(),
         };
@@ -222,7 +228,7 @@ impl Scene {
             match value.extract::<PyRef<'_, Motion>>() {
                 Ok(motion) => given.set_item(key, motion.keys(py)?)?,
                 // A name may be that of a body to come.
-                Err(_) if OF_BODIES.contains(&name.as_str()) && value.is_instance_of::<PyInt>() => {
+                Err(_) if OF_BODIES.contains(&name.as_str()) && !is_text(&value) => {
                     given.set_item(key, self.named_body(kind, &name, &value)?)?;
                 }
                 Err(_) => given.set_item(key, value)?,

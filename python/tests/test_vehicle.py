@@ -129,6 +129,11 @@ def test_forces_name_bodies_by_number_too():
     scene.add_force("spring", body="hull", to=1, stiffness=2.0)
     text = scene.to_toml()
     assert 'rotor = "rotor"' in text and 'to = "rotor"' in text and text.count('body = "hull"') == 2
+    scene.add_force("damping", body=np.int64(0), linear=(1.0,) * 6)
+    assert scene.to_toml().count('body = "hull"') == 3
+    for wrong in (False, -1, 0.5, np.zeros(2)):
+        with pytest.raises(hg.InputError, match=r"damping: body: got .*; must be the number or name of a body"):
+            scene.add_force("damping", body=wrong, linear=(1.0,) * 6)
     with pytest.raises(hg.InputError, match=r"thruster: body.*got 2.*\[\"hull\", \"rotor\"\]"):
         scene.add_force("thruster", body=2, direction=(1, 0, 0))
     with pytest.raises(hg.InputError, match="pd.*none of the scene's is actuated"):

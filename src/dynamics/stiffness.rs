@@ -1,7 +1,7 @@
 //! How fast forces slow what moves, and how fast they swing it: what integrators that take them explicitly must resolve.
 //!
-//! g being the forces in the user's coordinates without the water's inertia, D = −∂g/∂v and K = −∂g/∂q at rest, both on the coordinates that nothing drives, the rates are the real parts of the
-//! eigenvalues of M⁻¹ D, and the angular frequencies the roots of those of M⁻¹ K: what acts one way only, as a propeller's speed on a hull, makes none. A step that moves by the velocity in which it has solved for D is stable while Δt² K < 4 (M + ½ Δt D): for it
+//! g being the forces in the user's coordinates without the water's inertia, D = −∂g/∂v and K = −∂g/∂q at rest, both on the coordinates that nothing drives, the rates are the
+//! eigenvalues of M⁻¹ D, complex where forces turn what they slow, and the squares of angular frequencies the real parts of those of M⁻¹ K: what acts one way only, as a propeller's speed on a hull, makes none. A step that moves by the velocity in which it has solved for D is stable while Δt² K < 4 (M + ½ Δt D): for it
 //! M + ½ Δt D stands in place of M. Of many bodies that are coupled by products M is what each tree has alone.
 
 use super::fluid::FluidMomenta;
@@ -9,8 +9,8 @@ use super::force::{ForceModel, Loads, Velocity};
 use super::islands::Islands;
 use super::{Drive, Evaluation, Parameters, System};
 use crate::Result;
-use crate::solver::{growth, scaled_by};
-use nalgebra::{DMatrix, DVector};
+use crate::solver::{eigenvalues, scaled_by};
+use nalgebra::{Complex, DMatrix, DVector};
 
 /// Part of a matrix' entries up to which its other half differs by rounding.
 const EVEN: f64 = 1e-9;
@@ -32,7 +32,7 @@ struct Pencil {
 }
 
 impl System {
-    /// The fastest rate at which forces slow what moves at `time` (s), if it is above `enough` (1/s). Water is asked for its inertia only where the bodies' own is too small.
+    /// The fastest rate at which forces slow what moves at `time` (s), if it is above `enough` (1/s); `rate` makes a rate of a complex one. Water is asked for its inertia only where the bodies' own is too small.
     ///
     /// # Errors
     /// As [`System::evaluate`].
@@ -44,8 +44,10 @@ impl System {
         control: &DVector<f64>,
         time: f64,
         enough: f64,
+        rate: impl Fn(Complex<f64>) -> f64,
     ) -> Result<Option<Fastest>> {
-        self.fastest(parameters, q, time, enough, |e| e.slowing(v, control))
+        let pencil = |e: &Evaluation| e.slowing(v, control);
+        self.fastest(parameters, q, time, enough, pencil, &rate)
     }
 
     /// The largest angular frequency at which forces swing what rests at `time` (s), if it is above `enough` (rad/s), in steps of `implicit` (s) that solve for the velocity in forces, if they do.
@@ -63,14 +65,14 @@ impl System {
         enough: f64,
     ) -> Result<Option<Fastest>> {
         let pencil = |e: &Evaluation| e.swinging(control, implicit);
-        let found = self.fastest(parameters, q, time, enough * enough, pencil)?;
+        let found = self.fastest(parameters, q, time, enough * enough, pencil, &|x| x.re)?;
         Ok(found.map(|Fastest { rate, body }| Fastest {
             rate: rate.sqrt(),
             body,
         }))
     }
 
-    /// The largest eigenvalue of all pencils' if it is above `enough`.
+    /// The largest that `rate` makes of all pencils' eigenvalues if it is above `enough`.
     fn fastest(
         &self,
         parameters: &Parameters,
@@ -78,25 +80,31 @@ impl System {
         time: f64,
         enough: f64,
         pencil: impl Fn(&Evaluation) -> Option<Pencil>,
+        rate: &dyn Fn(Complex<f64>) -> f64,
     ) -> Result<Option<Fastest>> {
         let kinematics = self.kinematics(q)?;
         let (still, report) = (FluidMomenta::Still, Default::default());
         let dry = Evaluation::new(self, parameters, q, time, kinematics, still, report);
         // The water only adds to the inertia, but where a given added mass is smaller than what others change of it.
         let fast = |found: &Fastest| found.rate > enough;
-        let alone = self.fastest_of(pencil(&dry));
+        let alone = self.fastest_of(pencil(&dry), rate);
         let is_slow = matches!(&alone, Ok(found) if found.is_none_or(|found| !fast(&found)));
         if is_slow || !self.in_water(parameters) {
             return Ok(alone.ok().flatten().filter(fast));
         }
         let wet = self.evaluate_apart(parameters, q, time)?;
-        Ok(self.fastest_of(pencil(&wet)).ok().flatten().filter(fast))
+        Ok(self
+            .fastest_of(pencil(&wet), rate)
+            .ok()
+            .flatten()
+            .filter(fast))
     }
 
     /// None where there is no pencil.
     fn fastest_of(
         &self,
         pencil: Option<Pencil>,
+        rate: &dyn Fn(Complex<f64>) -> f64,
     ) -> std::result::Result<Option<Fastest>, Indefinite> {
         let Some(Pencil { islands, of, by }) = pencil else {
             return Ok(None);
@@ -117,7 +125,7 @@ impl System {
             if of.iter().all(|x| *x == 0.0) {
                 continue;
             }
-            let (rate, at) = largest(0.5 * (&by + by.transpose()), &of).ok_or(Indefinite)?;
+            let (rate, at) = largest(0.5 * (&by + by.transpose()), &of, rate).ok_or(Indefinite)?;
             if found.is_none_or(|other| rate > other.rate) {
                 let body = free[island[own[at]]];
                 found = body.map(|body| Fastest { rate, body });
@@ -213,14 +221,20 @@ impl Evaluation<'_> {
     }
 }
 
-/// The largest real part of the eigenvalues of M⁻¹ S, and the coordinate that is most of its direction, or its own largest; none where M isn't positive definite.
-fn largest(m: DMatrix<f64>, s: &DMatrix<f64>) -> Option<(f64, usize)> {
+/// The largest that `rate` makes of the eigenvalues of M⁻¹ S, and the coordinate that is most of its direction, or its own largest; none where M isn't positive definite.
+fn largest(
+    m: DMatrix<f64>,
+    s: &DMatrix<f64>,
+    rate: &dyn Fn(Complex<f64>) -> f64,
+) -> Option<(f64, usize)> {
     let scaled = scaled_by(&m.cholesky()?.unpack(), s)?;
     if (&scaled - scaled.transpose()).amax() > EVEN * scaled.amax() {
         let at = scaled.diagonal().imax();
-        return Some((growth(scaled), at));
+        let each = eigenvalues(scaled)?;
+        return Some((each.iter().map(|x| rate(*x)).fold(0.0, f64::max), at));
     }
     let even = (0.5 * (&scaled + scaled.transpose())).symmetric_eigen();
     let k = even.eigenvalues.imax();
-    Some((even.eigenvalues[k], even.eigenvectors.column(k).iamax()))
+    let found = rate(Complex::from(even.eigenvalues[k]));
+    Some((found, even.eigenvectors.column(k).iamax()))
 }

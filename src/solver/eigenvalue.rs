@@ -2,7 +2,7 @@
 
 use super::Columns;
 use crate::adjoint::sample;
-use nalgebra::{DMatrix, linalg::Schur};
+use nalgebra::{Complex, DMatrix, DVector, linalg::Schur};
 
 /// Most and least steps of an estimate.
 const STEPS: usize = 24;
@@ -73,18 +73,19 @@ pub fn scaled_by(lower: &DMatrix<f64>, s: &DMatrix<f64>) -> Option<DMatrix<f64>>
     scaled.iter().all(|x| x.is_finite()).then_some(scaled)
 }
 
+/// Eigenvalues of a square matrix; none where they aren't found.
+pub fn eigenvalues(a: DMatrix<f64>) -> Option<DVector<Complex<f64>>> {
+    let steps = ROTATIONS * a.nrows();
+    Some(Schur::try_new(a, f64::EPSILON, steps)?.complex_eigenvalues())
+}
+
 /// The largest real part of the eigenvalues of a square matrix: the rate at which ẋ = A x grows in the end. That of its symmetric part bounds it, and says how fast x may grow
 /// at first: of what acts one way only, as a propeller's speed on a hull, as fast as one likes to scale it.
 pub fn growth(a: DMatrix<f64>) -> f64 {
-    let n = a.nrows();
-    let bound = (0.5 * (&a + a.transpose())).symmetric_eigenvalues().max();
-    let Some(schur) = Schur::try_new(a, f64::EPSILON, ROTATIONS * n) else {
-        return bound;
-    };
-    let parts = schur.complex_eigenvalues();
-    parts
-        .iter()
-        .fold(f64::NEG_INFINITY, |most, x| most.max(x.re))
+    let bound = || (0.5 * (&a + a.transpose())).symmetric_eigenvalues().max();
+    let largest =
+        |found: DVector<Complex<f64>>| found.iter().map(|x| x.re).fold(f64::NEG_INFINITY, f64::max);
+    eigenvalues(a.clone()).map_or_else(bound, largest)
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ mod sparse_rows;
 pub use cgls::{Outcome, cgls, cgls_watched};
 pub use cholesky::Cholesky;
 pub use columns::{Columns, dot};
-pub(crate) use eigenvalue::{condition, growth, largest_eigenvalue, scaled_by};
+pub(crate) use eigenvalue::{condition, eigenvalues, growth, largest_eigenvalue, scaled_by};
 pub use gmres::{gmres, gmres_beside};
 pub(crate) use inverse_cholesky::AT_ONCE;
 pub use inverse_cholesky::{InverseCholesky, LEAST_RHO};

@@ -3,7 +3,8 @@
 use crate::support::INTEGRATORS;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{
-    Body, Drag, DragPart, Fluid, Joint, Passive, Scene, Servo, Shape, Spring, Tendon, Thruster,
+    Body, Damping, Drag, DragPart, Fluid, Joint, Passive, Scene, Servo, Shape, Spring, Tendon,
+    Thruster,
 };
 use hydrograd::{Controls, Fidelity, Settings, Simulator};
 
@@ -230,4 +231,49 @@ fn what_acts_one_way_only_is_not_stiff() {
             assert!(off < most, "{integrator:?}, {inertia}: {off}");
         }
     }
+}
+
+/// Damping that turns what it slows, D = [a, k; −k, b] over m/Δt: told where steps let it grow, and not where they don't.
+#[test]
+fn damping_that_turns_is_told_where_it_grows() {
+    let dt = 0.01;
+    let mass = 998.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3 * 1.5;
+    let (mut told, mut calm) = (0, 0);
+    for integrator in [Integrator::VelocityEuler, Integrator::Rk2, Integrator::Rk4] {
+        let limit = integrator.damping_limit().unwrap();
+        for (a, b, k) in [
+            (0.8, 0.8, 0.0),
+            (1.2, 0.0, 0.0),
+            (1.2, 0.0, 1.0),
+            (1.2, 0.05, 2.0),
+            (0.25, 0.25, 2.0),
+            (0.05, 0.05, 1.5),
+            (0.3, 0.3, 0.3),
+            (0.5, 0.5, 0.45),
+            (0.4, 0.2, 0.2),
+            (0.01, 0.01, 0.1),
+        ] {
+            let size = limit * mass / dt;
+            let mut scene = Scene::new(Fluid::fresh_water());
+            scene.fluid.density = 998.0;
+            scene.add(Body::new(Shape::sphere(0.1)).named("ball").density(998.0));
+            let mut rows = [[0.0; 6]; 6];
+            (rows[0][0], rows[1][1]) = (a * size, b * size);
+            (rows[0][1], rows[1][0]) = (k * size, -k * size);
+            (0..6).for_each(|i| rows[i][i] += if i > 1 { 0.1 } else { 0.0 });
+            scene.add_force(Damping::new("ball").linear(rows).into());
+            scene.initial.v = vec![0.5, 0.2, -0.1, 0.3, 0.2, -0.4];
+            let simulator = simulator(&scene, integrator, dt);
+            let is_told = simulator.start_stiffness_warning().is_some();
+            let made = simulator.rollout(&Controls::zeros(&simulator, 400));
+            let speed = made.map_or(f64::INFINITY, |r| r.samples()[400].v.rows(0, 2).norm());
+            println!("{integrator:?} {a} {b} {k}: told {is_told}, ends at {speed:.1e} m/s");
+            assert_eq!(is_told, speed > 10.0, "{integrator:?} {a} {b} {k}: {speed}");
+            match is_told {
+                true => told += 1,
+                false => calm += 1,
+            }
+        }
+    }
+    assert!(told >= 12 && calm >= 9, "{told} {calm}");
 }

@@ -13,12 +13,13 @@
 //! the momentum along B:
 //!
 //! ```text
-//! p̂⁺ = p̂* + (s − 1) X⁻ᵀ M(q⁺) e      s² = 1 − c(φ δ / ½ eᵀ M(q⁺) e)      (Bᵀ M B) ω = Bᵀ p*
+//! p̂⁺ = p̂* + (s − 1) X⁻ᵀ M(q⁺) e      s² = 1 − c(φ χ δ / ½ eᵀ M(q⁺) e)      (Bᵀ M B) ω = Bᵀ p*
 //! ```
 //!
 //! A motion of B that would move a joint that is held isn't one of all bodies together, and isn't among them.
 //!
 //! c is the identity up to ¼ and bounded by ½. φ = 10⁻⁴ |v|²_M / (10⁻⁴ |v|²_M + |v_e − v|²_M) fades out where contact takes speed: an impact loses more than this accounts for.
+//! χ fades out where e has less than a hundredth of the energy, from a thousandth on to nothing: what the motion of all together gains or loses would be all that a light rotor has.
 //!
 //! This is a projection on the energy (Hairer, Lubich, Wanner, "Geometric Numerical Integration", IV.4) in the one direction that keeps momenta.
 
@@ -36,6 +37,9 @@ use rayon::prelude::*;
 
 /// Part of the kinetic energy that contact takes at which the correction is halved.
 const FADE: f64 = 1e-4;
+/// Part of the energy that e has from which on it takes all of a defect, and up to which none.
+const ENOUGH: f64 = 1e-2;
+const TOO_LITTLE: f64 = 1e-3;
 /// Part of the energy of e up to which a defect is taken as it is.
 const WHOLE: f64 = 0.25;
 
@@ -46,6 +50,19 @@ fn bounded(x: f64) -> (f64, f64) {
     }
     let over = ((x.abs() - WHOLE) / WHOLE).tanh();
     (x.signum() * (WHOLE + WHOLE * over), 1.0 - over * over)
+}
+
+/// χ of the part of the energy that e has, and its derivative.
+fn share(part: f64) -> (f64, f64) {
+    let x = (part - TOO_LITTLE) / (ENOUGH - TOO_LITTLE);
+    match x {
+        x if x <= 0.0 => (0.0, 0.0),
+        x if x >= 1.0 => (1.0, 0.0),
+        x => (
+            x * x * x * (10.0 + x * (6.0 * x - 15.0)),
+            30.0 * x * x * (1.0 - x) * (1.0 - x) / (ENOUGH - TOO_LITTLE),
+        ),
+    }
 }
 
 /// B, of a step that can be closed: in still water or where all may drift with it, of joints that nothing drives, and with some motion beside that of all bodies together. What would move a
@@ -99,8 +116,9 @@ struct Parts {
     common: Option<Definite>,
     /// M(q⁺) e in frame coordinates.
     direction: DVector<f64>,
-    /// ½ eᵀ M e.
+    /// ½ eᵀ M e, and ½ v*ᵀ M v*.
     room: f64,
+    kinetic: f64,
     /// F, user's coordinates.
     loads: DVector<f64>,
     /// g.
@@ -173,6 +191,7 @@ impl Parts {
             common,
             direction,
             room,
+            kinetic,
             loads,
             contact,
             before: speed,
@@ -187,8 +206,18 @@ impl Parts {
 
     /// s − 1.
     fn change(&self) -> f64 {
-        let taken = bounded(self.fade * self.defect / self.room).0;
+        let taken = bounded(self.ratio()).0;
         (1.0 - taken).sqrt() - 1.0
+    }
+
+    /// χ and its derivative by the part of the energy that e has.
+    fn share(&self) -> (f64, f64) {
+        share(self.room / self.kinetic)
+    }
+
+    /// φ χ δ / ½ eᵀ M e.
+    fn ratio(&self) -> f64 {
+        self.fade * self.share().0 * self.defect / self.room
     }
 }
 
@@ -307,24 +336,23 @@ impl<'a> Closure<'a> {
         let change = parts.change();
         let change_bar = hat_bar.dot(&parts.direction);
         let direction_bar = change * hat_bar;
-        let slope = bounded(parts.fade * parts.defect / parts.room).1;
+        let slope = bounded(parts.ratio()).1;
         let ratio_bar = -0.5 * slope / (1.0 + change) * change_bar;
-        let defect_bar = parts.fade * ratio_bar / parts.room;
-        let fade_bar = parts.defect * ratio_bar / parts.room;
-        let room_bar = -parts.fade * parts.defect * ratio_bar / (parts.room * parts.room);
+        let (share, share_slope) = parts.share();
+        let defect_bar = parts.fade * share * ratio_bar / parts.room;
+        let fade_bar = share * parts.defect * ratio_bar / parts.room;
+        let part_bar = share_slope * parts.fade * parts.defect * ratio_bar / parts.room;
+        let room_bar = part_bar / parts.kinetic - parts.ratio() * ratio_bar / parts.room;
+        let kinetic_bar = -part_bar * parts.room / (parts.kinetic * parts.kinetic);
 
         // The direction p̂* − M B ω, and ½ eᵀ M e = ½ v*ᵀ M v* − ½ ωᵀ Bᵀ M B ω.
         let mut at_end = StepBar::zeros(end);
         let mut hat_star_bar = direction_bar.clone();
         let mut across = end.frame_velocity_inverse(&direction_bar);
         let v_hat = end.frame_velocity(&parts.v);
-        hat_star_bar += (defect_bar + room_bar) * &v_hat;
-        self.inertia_vjp(
-            -0.5 * (defect_bar + room_bar),
-            &parts.v,
-            &parts.v,
-            &mut at_end,
-        )?;
+        let whole_bar = defect_bar + room_bar + kinetic_bar;
+        hat_star_bar += whole_bar * &v_hat;
+        self.inertia_vjp(-0.5 * whole_bar, &parts.v, &parts.v, &mut at_end)?;
         if let Some(common) = &parts.common {
             let basis = &parts.basis;
             let moved = end.frame_dual(&end.mass_times(&across));

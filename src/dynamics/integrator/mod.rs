@@ -32,6 +32,7 @@ mod quasi;
 mod reaction;
 mod readout;
 mod record;
+mod region;
 mod rule;
 mod runge_kutta;
 mod solved;

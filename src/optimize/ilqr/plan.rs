@@ -16,7 +16,7 @@ pub enum Guess<'a> {
     Zero,
     /// These, controls × knots.
     Controls(&'a DMatrix<f64>),
-    /// A plan that was made before, with its feedback: from the trajectory's first state on it is `shift` time steps on its way. Past its end its last controls are held.
+    /// A plan that was made before, with its feedback or without, whichever costs less: from the trajectory's first state on it is `shift` time steps on its way. Past its end its last controls are held.
     Plan {
         /// The plan ([`Plan::tracking`]).
         plan: &'a Tracking,
@@ -87,6 +87,15 @@ pub(super) fn track(
     }))
 }
 
+/// A run, none where it failed.
+fn possible(made: Result<Run>) -> Result<Option<Run>> {
+    match made {
+        Ok(run) => Ok(Some(run)),
+        Err(e) if e.ends_search() => Err(e),
+        Err(_) => Ok(None),
+    }
+}
+
 impl Guess<'_> {
     /// The trajectory to start from.
     pub(super) fn run(&self, ready: &Ready, simulator: &Simulator, start: &State) -> Result<Run> {
@@ -139,11 +148,15 @@ impl Guess<'_> {
                     |k: usize, _: &DVector<f64>, _: &DVector<f64>, _: Option<&DVector<f64>>| {
                         plan.planned(step(k))
                     };
-                let failed = |e: Error| if e.ends_search() { Err(e) } else { Ok(()) };
-                ready
-                    .run(simulator, start, with_feedback)
-                    .or_else(|e| failed(e).and_then(|()| ready.run(simulator, start, alone)))
-                    .or_else(|e| failed(e).and_then(|()| Guess::Zero.run(ready, simulator, start)))
+                let (followed, alone) = rayon::join(
+                    || ready.run(simulator, start, with_feedback),
+                    || ready.run(simulator, start, alone),
+                );
+                match (possible(followed)?, possible(alone)?) {
+                    (Some(followed), Some(alone)) if alone.cost < followed.cost => Ok(alone),
+                    (Some(run), _) | (None, Some(run)) => Ok(run),
+                    (None, None) => Guess::Zero.run(ready, simulator, start),
+                }
             }
         }
     }

@@ -266,9 +266,13 @@ fn damping_that_turns_is_told_where_it_grows() {
             let simulator = simulator(&scene, integrator, dt);
             let is_told = simulator.start_stiffness_warning().is_some();
             let made = simulator.rollout(&Controls::zeros(&simulator, 400));
-            let speed = made.map_or(f64::INFINITY, |r| r.samples()[400].v.rows(0, 2).norm());
-            println!("{integrator:?} {a} {b} {k}: told {is_told}, ends at {speed:.1e} m/s");
-            assert_eq!(is_told, speed > 10.0, "{integrator:?} {a} {b} {k}: {speed}");
+            // What has got fast may turn, and keep its speed then.
+            let speed = made.map_or(f64::INFINITY, |r| {
+                let each = r.samples().iter().map(|s| s.v.rows(0, 2).norm());
+                each.fold(0.0, f64::max)
+            });
+            println!("{integrator:?} {a} {b} {k}: told {is_told}, at most {speed:.1e} m/s");
+            assert_eq!(is_told, speed > 5.0, "{integrator:?} {a} {b} {k}: {speed}");
             match is_told {
                 true => told += 1,
                 false => calm += 1,

@@ -34,7 +34,8 @@ use crate::Result;
 use crate::error::in_order;
 use crate::simulate::{Simulator, State};
 use backward::{Answer, Backward, KnotModel, backward, gradient};
-use nalgebra::DVector;
+use idle::Idle;
+use nalgebra::{DMatrix, DVector};
 use problem::Run;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -64,8 +65,9 @@ struct Model {
     knots: Vec<KnotModel>,
     last: super::cost::Quadratic,
     gradient: f64,
-    /// Knots and controls whose slopes are those that they have elsewhere.
+    /// Knots and controls whose slopes are those that they have elsewhere, and all knots' own.
     lent: Vec<(usize, usize)>,
+    own: Vec<DMatrix<f64>>,
 }
 
 impl Model {
@@ -87,24 +89,25 @@ impl Model {
             last,
             gradient,
             lent: Vec::new(),
+            own: Vec::new(),
         })
     }
 
     /// The same, in which controls without a slope have the one that they have elsewhere.
-    fn lent(ready: &Ready, run: &Run) -> Result<Self> {
+    fn lent(ready: &Ready, run: &Run, idle: &Idle) -> Result<Self> {
         let mut out = Self::of(ready, run)?;
-        out.lent = idle::lend(ready, run, &mut out.knots)?;
+        let own: Vec<_> = out.knots.iter().map(|knot| knot.b.clone()).collect();
+        out.lent = idle.lend(ready, run, &mut out.knots)?;
+        out.own = if out.lent.is_empty() { Vec::new() } else { own };
         Ok(out)
     }
 
     /// Takes the slopes that aren't its own back; whether there were any.
     fn is_taken_back(&mut self) -> bool {
-        for (k, i) in &self.lent {
-            self.knots[*k].b.column_mut(*i).fill(0.0);
+        for (k, i) in std::mem::take(&mut self.lent) {
+            self.knots[k].b.set_column(i, &self.own[k].column(i));
         }
-        let any = !self.lent.is_empty();
-        self.lent.clear();
-        any
+        !std::mem::take(&mut self.own).is_empty()
     }
 }
 
@@ -174,7 +177,8 @@ pub(super) fn solve(
     let mut watch = Watch(begun);
     let mut run = guess.run(ready, simulator, start)?;
     watch.lap(&mut times.rollouts);
-    let mut model = Model::lent(ready, &run)?;
+    let idle = Idle::new(ready, &run)?;
+    let mut model = Model::lent(ready, &run, &idle)?;
     watch.lap(&mut times.derivatives);
     let mut trust = Trust::new(settings);
     let mut costs = vec![run.cost];
@@ -184,7 +188,7 @@ pub(super) fn solve(
     let mut answers;
     let stop = loop {
         if !fresh {
-            model = Model::lent(ready, &run)?;
+            model = Model::lent(ready, &run, &idle)?;
             fresh = true;
             watch.lap(&mut times.derivatives);
         }
@@ -266,7 +270,7 @@ pub(super) fn solve(
     };
     if !fresh && settings.last_gains {
         watch.lap(&mut times.rollouts);
-        model = Model::lent(ready, &run)?;
+        model = Model::lent(ready, &run, &idle)?;
         watch.lap(&mut times.derivatives);
         if let Some(sweep) = backward(&model.knots, &model.last, trust.mu) {
             answers = sweep.answers;
@@ -294,7 +298,7 @@ fn still(ready: &Ready) -> Vec<Answer> {
     let (nu, nx) = (ready.cost.sizes.controls, ready.cost.sizes.states());
     let one = Answer {
         step: DVector::zeros(nu),
-        gain: nalgebra::DMatrix::zeros(nu, nx),
+        gain: DMatrix::zeros(nu, nx),
         of_previous: None,
         held: vec![false; nu],
     };

@@ -61,7 +61,7 @@ impl Scene {
             .filter(|name| self.0.body(name).is_some())
             .ok_or_else(|| {
                 input(
-                    &format!("{what}: {key}"),
+                    format!("{what}: {key}"),
                     body.to_string(),
                     format!(
                         "must be the number or name of a body: {:?}",

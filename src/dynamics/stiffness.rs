@@ -7,7 +7,7 @@
 use super::fluid::FluidMomenta;
 use super::force::{ForceModel, Loads, Velocity};
 use super::islands::Islands;
-use super::{Drive, Evaluation, Parameters, System};
+use super::{Drive, Evaluation, Integrator, Parameters, System};
 use crate::Result;
 use crate::solver::{eigenvalues, scaled_by};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -32,7 +32,8 @@ struct Pencil {
 }
 
 impl System {
-    /// The fastest rate at which forces slow what moves at `time` (s), if it is above `enough` (1/s); `rate` makes a rate of a complex one. Water is asked for its inertia only where the bodies' own is too small.
+    /// The fastest rate at which forces slow what moves at `time` (s), if it is more than an integrator bears that takes them explicitly in steps of `dt` (s); of what turns as it is slowed the one that is
+    /// as near to growing. None for integrators that solve for the velocity. Water is asked for its inertia only where the bodies' own is too small.
     ///
     /// # Errors
     /// As [`System::evaluate`].
@@ -43,11 +44,14 @@ impl System {
         v: &DVector<f64>,
         control: &DVector<f64>,
         time: f64,
-        enough: f64,
-        rate: impl Fn(Complex<f64>) -> f64,
+        (integrator, dt): (Integrator, f64),
     ) -> Result<Option<Fastest>> {
+        let Some(limit) = integrator.damping_limit() else {
+            return Ok(None);
+        };
+        let rate = |z: Complex<f64>| integrator.straight(z * dt) / dt;
         let pencil = |e: &Evaluation| e.slowing(v, control);
-        self.fastest(parameters, q, time, enough, pencil, &rate)
+        self.fastest(parameters, q, time, limit / dt, pencil, &rate)
     }
 
     /// The largest angular frequency at which forces swing what rests at `time` (s), if it is above `enough` (rad/s), in steps of `implicit` (s) that solve for the velocity in forces, if they do.

@@ -11,7 +11,7 @@ use crate::adjoint::rigid::inertia_matrix;
 use crate::dynamics::force::ForceModel;
 use crate::dynamics::{Drive, Integrator, System};
 use crate::error::readable;
-use nalgebra::{Complex, DVector};
+use nalgebra::DVector;
 
 /// Share of the largest kinetic energy that may come from nowhere before a run warns. Every integrator but the paper's
 /// stays under 1.2 % on the example scenes.
@@ -50,8 +50,8 @@ impl Simulator {
         let stepper = self.stepper();
         let (limit, dt) = (stepper.integrator.damping_limit()?, self.time_step());
         let system = self.system();
-        let rate = |z: Complex<f64>| stepper.integrator.straight(z * dt) / dt;
-        let found = system.damping(self.parameters(), q, v, control, time, limit / dt, rate);
+        let step = (stepper.integrator, dt);
+        let found = system.damping(self.parameters(), q, v, control, time, step);
         // What fails here fails in the run, with its error.
         let damping = found.ok().flatten()?;
         let name = &system.bodies[damping.body].name;

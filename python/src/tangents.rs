@@ -182,29 +182,28 @@ pub fn jvp<'py>(
         let asked: Vec<&str> = asked.iter().map(String::as_str).collect();
         shared.jvp_with(&displacements, &asked, |_| interrupt.check())
     })?;
-    let states = rollout.states().len();
-    let stacked = |of: &dyn Fn(&Tangents) -> &DMatrix<f64>, inner: &[usize]| {
+    let (steps, states) = (rollout.steps(), rollout.states().len());
+    let stacked = |of: &dyn Fn(&Tangents) -> &DMatrix<f64>, rows: usize, inner: &[usize]| {
         let values = made.iter().flat_map(|t| of(t).iter().copied()).collect();
         let lead = if many { vec![count] } else { Vec::new() };
-        array::to_python(py, values, &[&lead, &[states][..], inner].concat())
+        array::to_python(py, values, &[&lead, &[rows][..], inner].concat())
     };
     let nv = [rollout.simulator().system().tree.velocities()];
-    let nu = rollout.controls().nrows();
-    let applied = made.iter().flat_map(|t| t.applied_controls.iter().copied());
-    let applied: Vec<f64> = applied.collect();
-    let lead = if many { vec![count] } else { Vec::new() };
-    let applied = array::to_python(py, applied, &[&lead, &[states - 1, nu][..]].concat())?;
-    let observed = |name: &str| stacked(&|t| &t.observables[name], &tangent_shape(rollout, name)?);
+    let nu = [rollout.controls().nrows()];
+    let observed = |name: &str| {
+        let inner = tangent_shape(rollout, name)?;
+        stacked(&|t| &t.observables[name], states, &inner)
+    };
     let others = PyDict::new(py);
     for name in &observables {
         others.set_item(name, observed(name)?)?;
     }
     let parts = (
-        stacked(&|t| &t.q, &nv)?,
-        stacked(&|t| &t.v, &nv)?,
+        stacked(&|t| &t.q, states, &nv)?,
+        stacked(&|t| &t.v, states, &nv)?,
         observed("positions")?,
         observed("rotations")?,
-        applied,
+        stacked(&|t| &t.applied_controls, steps, &nu)?,
         others,
     );
     py.import("hydrograd._gradient")?

@@ -20,6 +20,20 @@ const LITTLE: f64 = 1e-9;
 /// The slopes of a search's controls away from where it begins, by which one that has next to none is told: the length of each control's, at the first knot.
 pub(super) struct Idle(Vec<f64>);
 
+/// A control of a knot whose slope isn't its own, and that.
+pub(super) struct Lent {
+    knot: usize,
+    control: usize,
+    own: DVector<f64>,
+}
+
+impl Lent {
+    /// Gives the knot its own back.
+    pub fn take_back(self, knots: &mut [KnotModel]) {
+        knots[self.knot].b.set_column(self.control, &self.own);
+    }
+}
+
 impl Idle {
     /// Of the trajectory that a search begins with. Where it can't be found, only what changes nothing at all has no slope.
     ///
@@ -28,28 +42,22 @@ impl Idle {
     pub fn new(ready: &Ready, run: &Run) -> Result<Self> {
         let control = run.controls.column(0).into_owned();
         let size = size(run);
-        let away = (0..control.len()).map(|i| {
+        let moved = DVector::from_fn(control.len(), |i, _| {
             let room = [ready.lower[i] - control[i], ready.upper[i] - control[i]];
             control[i] + away(room, size)
         });
-        let away = DVector::from_iterator(control.len(), away);
-        match slopes(ready, run, 0, &away) {
+        match slopes(ready, run, 0, &moved) {
             Ok(slopes) => Ok(Self(slopes.column_iter().map(|b| b.norm()).collect())),
             Err(stop) if stop.ends_search() => Err(stop),
             Err(_) => Ok(Self(vec![0.0; control.len()])),
         }
     }
 
-    /// Gives controls that have no slope where they are the one that they have away from there, all of a knot at once; which have one, by knot and control.
+    /// Gives controls that have no slope where they are the one that they have away from there, all of a knot at once; those that have one.
     ///
     /// # Errors
     /// What ends a search. A knot that can't be simulated so keeps what it has.
-    pub fn lend(
-        &self,
-        ready: &Ready,
-        run: &Run,
-        knots: &mut [KnotModel],
-    ) -> Result<Vec<(usize, usize)>> {
+    pub fn lend(&self, ready: &Ready, run: &Run, knots: &mut [KnotModel]) -> Result<Vec<Lent>> {
         let size = size(run);
         let each = knots.par_iter_mut().enumerate().map(|(k, knot)| {
             let found = self.of(knot, size);
@@ -57,31 +65,36 @@ impl Idle {
                 return Ok(Vec::new());
             }
             let mut control = run.controls.column(k).into_owned();
-            for (i, away) in &found {
-                control[*i] += away;
+            for (i, far) in &found {
+                control[*i] += far;
             }
             let slopes = match slopes(ready, run, k, &control) {
                 Ok(slopes) => slopes,
                 Err(stop) if stop.ends_search() => return Err(stop),
                 Err(_) => return Ok(Vec::new()),
             };
-            let lent = found.iter().map(|(i, _)| *i);
-            let lent = lent.filter(|i| slopes.column(*i).amax() > 0.0);
-            let lent: Vec<_> = lent.map(|i| (k, i)).collect();
-            for (_, i) in &lent {
-                knot.b.set_column(*i, &slopes.column(*i));
-            }
-            Ok(lent)
+            let acts = |i: &usize| slopes.column(*i).amax() > 0.0;
+            let lent = found.iter().map(|(i, _)| *i).filter(acts);
+            let lend = |i: usize| {
+                let own = knot.b.column(i).into_owned();
+                knot.b.set_column(i, &slopes.column(i));
+                Lent {
+                    knot: k,
+                    control: i,
+                    own,
+                }
+            };
+            Ok(lent.map(lend).collect())
         });
-        Ok(in_order(each)?.concat())
+        Ok(in_order(each)?.into_iter().flatten().collect())
     }
 
     /// Controls of a knot that change next to nothing, and that limits let change, with how far off to look.
     fn of(&self, knot: &KnotModel, size: f64) -> Vec<(usize, f64)> {
         let still = |i: &usize| knot.b.column(*i).norm() <= LITTLE * self.0[*i];
-        let away = |i: usize| (i, away([knot.lower[i], knot.upper[i]], size));
-        let all = (0..knot.b.ncols()).filter(still).map(away);
-        all.filter(|(_, away)| *away != 0.0).collect()
+        let far = |i: usize| (i, away([knot.lower[i], knot.upper[i]], size));
+        let all = (0..knot.b.ncols()).filter(still).map(far);
+        all.filter(|(_, far)| *far != 0.0).collect()
     }
 }
 

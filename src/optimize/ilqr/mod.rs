@@ -34,7 +34,7 @@ use crate::Result;
 use crate::error::in_order;
 use crate::simulate::{Simulator, State};
 use backward::{Answer, Backward, KnotModel, backward, gradient};
-use idle::Idle;
+use idle::{Idle, Lent};
 use nalgebra::{DMatrix, DVector};
 use problem::Run;
 use rayon::prelude::*;
@@ -65,9 +65,8 @@ struct Model {
     knots: Vec<KnotModel>,
     last: super::cost::Quadratic,
     gradient: f64,
-    /// Knots and controls whose slopes are those that they have elsewhere, and all knots' own.
-    lent: Vec<(usize, usize)>,
-    own: Vec<DMatrix<f64>>,
+    /// Controls whose slopes are those that they have elsewhere.
+    lent: Vec<Lent>,
 }
 
 impl Model {
@@ -89,25 +88,23 @@ impl Model {
             last,
             gradient,
             lent: Vec::new(),
-            own: Vec::new(),
         })
     }
 
     /// The same, in which controls without a slope have the one that they have elsewhere.
     fn lent(ready: &Ready, run: &Run, idle: &Idle) -> Result<Self> {
         let mut out = Self::of(ready, run)?;
-        let own: Vec<_> = out.knots.iter().map(|knot| knot.b.clone()).collect();
         out.lent = idle.lend(ready, run, &mut out.knots)?;
-        out.own = if out.lent.is_empty() { Vec::new() } else { own };
         Ok(out)
     }
 
     /// Takes the slopes that aren't its own back; whether there were any.
     fn is_taken_back(&mut self) -> bool {
-        for (k, i) in std::mem::take(&mut self.lent) {
-            self.knots[k].b.set_column(i, &self.own[k].column(i));
+        let any = !self.lent.is_empty();
+        for lent in self.lent.drain(..) {
+            lent.take_back(&mut self.knots);
         }
-        !std::mem::take(&mut self.own).is_empty()
+        any
     }
 }
 

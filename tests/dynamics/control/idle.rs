@@ -2,7 +2,7 @@
 
 use super::solve;
 use hydrograd::dynamics::Integrator;
-use hydrograd::optimize::{Cost, IlqrSettings, Mpc, MpcSettings, Problem, terms};
+use hydrograd::optimize::{Cost, IlqrSettings, Mpc, MpcRun, MpcSettings, Problem, terms};
 use hydrograd::scene::{Body, Fluid, Joint, Scene, Shape, Thruster};
 use hydrograd::{Fidelity, Settings, Simulator};
 use nalgebra::DVector;
@@ -41,6 +41,14 @@ fn to(place: f64) -> Problem {
     Problem::new(15, cost).hold(2).limits([-1.0], [1.0])
 }
 
+/// From rest at a place, m.
+fn run(mpc: &mut Mpc, plant: &Simulator, problem: &Problem, from: f64, steps: usize) -> MpcRun {
+    let q = DVector::from_element(1, from);
+    let start = plant.state(0, &q, &DVector::zeros(1)).unwrap();
+    let go_on = |_: &_| ControlFlow::Continue(());
+    mpc.run(plant, &start, steps, &problem.cost, go_on).unwrap()
+}
+
 /// From no control, where the model says that nothing helps.
 #[test]
 fn a_plan_moves_what_has_no_slope_at_rest() {
@@ -71,13 +79,7 @@ fn planning_again_holds_a_place_with_what_has_no_slope_at_rest() {
         let problem = to(0.0);
         let mut mpc = Mpc::new(&simulator, &problem, MpcSettings::default()).unwrap();
         for side in [0.3, -0.2, 0.1] {
-            let q = DVector::from_element(1, side);
-            let start = simulator.state(0, &q, &DVector::zeros(1)).unwrap();
-            let run = mpc
-                .run(&simulator, &start, 60, &problem.cost, |_| {
-                    ControlFlow::Continue(())
-                })
-                .unwrap();
+            let run = run(&mut mpc, &simulator, &problem, side, 60);
             let end = run.rollout.samples()[60].q[0];
             println!("{name}: from {side} to {end:.4}, cost {:.4}", run.cost);
             assert!(end.abs() < 0.03, "{name}: {end}");
@@ -95,13 +97,7 @@ fn feedback_that_spoils_a_start_is_left() {
     for limit in [10.0, f64::INFINITY] {
         let problem = to(0.0).limits([-limit], [limit]);
         let mut mpc = Mpc::new(&simulator, &problem, MpcSettings::default()).unwrap();
-        let q = DVector::from_element(1, 0.3);
-        let start = simulator.state(0, &q, &DVector::zeros(1)).unwrap();
-        let run = mpc
-            .run(&simulator, &start, 80, &problem.cost, |_| {
-                ControlFlow::Continue(())
-            })
-            .unwrap();
+        let run = run(&mut mpc, &simulator, &problem, 0.3, 80);
         let end = run.rollout.samples()[80].q[0];
         let most = run.rollout.applied_controls().amax();
         println!(

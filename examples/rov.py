@@ -122,7 +122,7 @@ class Robot:
         self.vehicle, self.hand = (sim.body_names.index(name) for name in ("vehicle", "hand"))
         self.thrusters = sim.thruster_controls("vehicle")
         self.motors = [i for i in range(sim.control_size) if i not in self.thrusters]
-        self.joints = [sim.velocity_names.index(sim.control_names[i].replace(".force", "")) for i in self.motors]
+        self.joints = [sim.v_names.index(sim.control_names[i].replace(".force", "")) for i in self.motors]
         self.limits = np.ones(sim.control_size)
         self.limits[self.motors] = TORQUE
         self.goal = self.tips(sim.rollout(steps=0))[0]

@@ -296,7 +296,7 @@ def with_values(sim, values):
     made = sim.with_parameters({name: value for name, value in values.items() if not name.startswith("zero of ")})
     q = np.array(made.initial_q)
     for joint in ZEROS:
-        q[made.coordinate_names.index(f"r5m_{joint} zero.angle")] = values[f"zero of {joint}"]
+        q[made.q_names.index(f"r5m_{joint} zero.angle")] = values[f"zero of {joint}"]
     return made.with_start(q, made.initial_v)
 
 

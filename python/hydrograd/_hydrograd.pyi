@@ -739,12 +739,6 @@ class Simulator:
     @property
     def control_units(self) -> list[str]:
         """Units of the controls, in order: "N", "N m", of servos' targets "m" or "rad", of a thruster's rotor "rad/s", "1" of what scales or curves make something else of."""
-    @property
-    def coordinate_names(self) -> list[str]:
-        """Names of the joint coordinates, in order: "coin.y", "arm.angle", …"""
-    @property
-    def velocity_names(self) -> list[str]:
-        """Names of the generalised velocities, in order: "coin.vy", "arm.rate", …"""
     def allocation(self, body: _Body) -> _Array:
         """The allocation matrix (6, n) of the thrusters on a `body` (number or name), in the order in which they were added: the wrench of a newton of thrust on the body,
         its frame, about its origin, linear part first (1, m)."""
@@ -761,10 +755,10 @@ class Simulator:
         """Names of the bodies, in order."""
     @property
     def q_names(self) -> list[str]:
-        """Names of the entries of q."""
+        """Names of the entries of q, the joint coordinates, in order: "coin.y", "arm.angle", …"""
     @property
     def v_names(self) -> list[str]:
-        """Names of the entries of v."""
+        """Names of the entries of v, the generalised velocities, in order: "coin.vy", "arm.rate", …"""
     @property
     def fidelity(self) -> str:
         """The fidelity in use: what was asked for, or what "auto" chose."""
@@ -806,7 +800,7 @@ class Equations:
         """Centre of mass of all bodies in the world, m, (…, 3); NaN where there is no mass."""
     @property
     def center_of_buoyancy(self) -> _Array:
-        """Centre of the volume of all bodies in the water, at which their buoyancy acts, in the world, m, (…, 3); NaN where nothing is in the water."""
+        """Centre of the volume that all bodies displace, below a `waterline`, at which their buoyancy acts, in the world, m, (…, 3); NaN where nothing is in the water."""
     @property
     def potential_energy(self) -> _Array:
         """Potential energy, J, (…)."""
@@ -1128,7 +1122,7 @@ class Rollout:
         """Linearisations x_{n+1} ≈ A_n x_n + B_n u_n of all steps in x = (q, v), coordinates in their tangent space, the scene's controller included: A (N, 2 v_size, 2 v_size)
         and B (N, 2 v_size, control_size); with `parameters` also the derivatives with respect to those named (N, 2 v_size, parameters). Steps are taken on all cores."""
     def to_dict(self, *, pressure: bool = False) -> dict[str, _Array]:
-        """Columns by name, one row a state: time, each coordinate and velocity, energy, momentum and smallest gap, SI units, with `pressure` also that of the flow on every face
+        """Columns by name, one row a state: time, each coordinate and velocity, energy, momentum of all together, smallest gap, and the controls that acted from there on (NaN at the last state), SI units, with `pressure` also that of the flow on every face
         ("ball.pressure_0", …, Pa), at the price of solves of its own a state; `pandas.DataFrame(rollout.to_dict())` is a table."""
     def write_vtk(
         self,

@@ -301,7 +301,7 @@ impl Equations {
         })
     }
 
-    /// Centre of the volume of all bodies in the water, at which their buoyancy acts, in the world, m, (…, 3); NaN where nothing is in the water.
+    /// Centre of the volume that all bodies displace, below a `waterline`, at which their buoyancy acts, in the world, m, (…, 3); NaN where nothing is in the water.
     #[getter]
     fn center_of_buoyancy<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         self.each(py, &[3], |e: &simulate::Equations<'_>, _| {

@@ -18,6 +18,7 @@ mod loads;
 mod log;
 mod mapping;
 mod mesh;
+mod mpc;
 mod nested;
 mod objective;
 mod optimize;
@@ -132,6 +133,7 @@ fn _hydrograd(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(nested::_nested, m)?)?;
     m.add_function(wrap_pyfunction!(robot::inspect_robot, m)?)?;
     control::register(m)?;
+    m.add_class::<mpc::Mpc>()?;
     identify::register(m)?;
     optimize::register(m)?;
     objective::register(m)

@@ -8,7 +8,7 @@ use crate::interrupt::light;
 use crate::joint::Motion;
 use crate::mapping;
 use crate::robot::{self, Robot};
-use hydrograd::scene::{Site, Wall, WallSurface};
+use hydrograd::scene::{Force, Site, Wall, WallSurface};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyBool, PyDict, PyString};
 use std::path::PathBuf;
@@ -243,7 +243,10 @@ impl Scene {
             .import("json")?
             .call_method("dumps", (given,), Some(&options));
         let text: String = json.map_err(|e| not_a_force(kind, e))?.extract()?;
-        let force = serde_json::from_str(&text).map_err(|e| not_a_force(kind, e))?;
+        let force = Force::from_json(&text).map_err(|e| match e {
+            hydrograd::Error::Parse { message, .. } => not_a_force(kind, message),
+            e => exception(e),
+        })?;
         self.0.add_force(force);
         Ok(())
     }

@@ -14,11 +14,14 @@
 //! [`Articulated`] solves for accelerations at a cost linear in the bodies.
 
 mod articulated;
+mod charts;
+mod fields;
 mod joint;
 mod joint_blocks;
 mod tree;
 
 pub use articulated::{Articulated, Indefinite};
+pub use fields::{Cotangents, Fields, Virtual};
 pub use joint::{Joint, JointModel, JointMotion, Plane, Refused};
 pub use joint_blocks::JointBlocks;
-pub use tree::{Cotangents, Fields, Kinematics, Link, Tree, Virtual};
+pub use tree::{Kinematics, Link, Tree};

@@ -1,10 +1,7 @@
 //! The kinematic tree and the reverse of its velocity fields.
 
 use super::{JointBlocks, JointModel};
-use crate::adjoint::lie::{
-    Mat3, Pose, Vec3, Vec6, angular, cross_force, cross_motion, exp_jacobian, exp_jacobian_inverse,
-    exp_jacobian_inverse_jvp, exp_matrix, point_velocity, six,
-};
+use crate::adjoint::lie::{Pose, Vec3, Vec6, angular, cross_motion, point_velocity, six};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -59,6 +56,11 @@ impl Link {
         };
         self.columns.clone().zip(v)
     }
+
+    /// Sum of its columns with what goes with each of them.
+    pub(super) fn combine(&self, columns: &[Vec6], x: &DVector<f64>) -> Vec6 {
+        self.terms().map(|(column, k)| columns[column] * x[k]).sum()
+    }
 }
 
 /// A forest of bodies, parents before children.
@@ -76,61 +78,6 @@ pub struct Kinematics {
     pub frame_columns: Vec<Vec6>,
     /// User columns S = Ŝ X of the same.
     pub columns: Vec<Vec6>,
-}
-
-/// How the virtual velocity of [`Tree::fields`] is given.
-#[derive(Clone, Copy, Debug)]
-pub enum Virtual<'a> {
-    /// In frame coordinates ẑ (dual to frame momenta).
-    Frame(&'a DVector<f64>),
-    /// In the user's coordinates, ẑ = X z (dual to p).
-    User(&'a DVector<f64>),
-}
-
-/// The four fields over the bodies, spatial twists.
-#[derive(Clone, Debug)]
-pub struct Fields {
-    /// Twists V.
-    pub twist: Vec<Vec6>,
-    /// Virtual twists Z.
-    pub virtual_twist: Vec<Vec6>,
-    /// Rate D of Z at constant ẑ.
-    pub turning: Vec<Vec6>,
-    /// Rate C of V at constant v.
-    pub bias: Vec<Vec6>,
-    /// v̂ and ẑ, kept for the reverse.
-    frame_velocity: DVector<f64>,
-    frame_virtual: DVector<f64>,
-    frame_bias: DVector<f64>,
-}
-
-/// Cotangents of [`Fields`] and of the poses (spatial wrenches).
-#[derive(Clone, Debug)]
-pub struct Cotangents {
-    /// Of the poses: work done on a spatial displacement of each body.
-    pub pose: Vec<Vec6>,
-    /// Of V.
-    pub twist: Vec<Vec6>,
-    /// Of Z.
-    pub virtual_twist: Vec<Vec6>,
-    /// Of D.
-    pub turning: Vec<Vec6>,
-    /// Of C.
-    pub bias: Vec<Vec6>,
-}
-
-impl Cotangents {
-    /// All zero, for `bodies` bodies.
-    pub fn zeros(bodies: usize) -> Self {
-        let zero = vec![Vec6::zeros(); bodies];
-        Self {
-            pose: zero.clone(),
-            twist: zero.clone(),
-            virtual_twist: zero.clone(),
-            turning: zero.clone(),
-            bias: zero,
-        }
-    }
 }
 
 impl Tree {
@@ -282,100 +229,6 @@ impl Tree {
         out
     }
 
-    /// `q ⊕ xi` for all joints.
-    pub fn integrate(&self, q: &DVector<f64>, xi: &DVector<f64>) -> DVector<f64> {
-        self.per_joint(q, xi, |j, q, x| j.integrate(q, x))
-    }
-
-    /// The `xi` with which [`Tree::integrate`] gets from one configuration to the other; of rotations the shorter way.
-    pub fn difference(&self, from: &DVector<f64>, to: &DVector<f64>) -> DVector<f64> {
-        let [out] = self.joints(|l| [l.joint.difference(l.of_q(from), l.of_q(to))]);
-        out
-    }
-
-    /// Tangent cotangents of `(q, xi)` of [`Tree::integrate`].
-    pub fn integrate_vjp(
-        &self,
-        xi: &DVector<f64>,
-        bar: &DVector<f64>,
-    ) -> (DVector<f64>, DVector<f64>) {
-        self.joints(|l| l.joint.integrate_vjp(l.of_v(xi), l.of_v(bar)).into())
-            .into()
-    }
-
-    /// Tangents of [`Tree::integrate`] along those of q and of xi, a column for each direction.
-    pub fn integrate_jvp(
-        &self,
-        xi: &DVector<f64>,
-        q: &DMatrix<f64>,
-        along: &DMatrix<f64>,
-    ) -> DMatrix<f64> {
-        let mut out = q + along;
-        for (rows, theta) in self.rotations(xi) {
-            let turned = exp_matrix(&theta) * q.fixed_rows::<3>(rows)
-                + exp_jacobian(&theta) * along.fixed_rows::<3>(rows);
-            out.fixed_rows_mut::<3>(rows).copy_from(&turned);
-        }
-        out
-    }
-
-    /// First rows of the angular velocities in v of joints with a quaternion, each with the rotation vector in `xi`.
-    fn rotations(&self, xi: &DVector<f64>) -> impl Iterator<Item = (usize, Vec3)> {
-        let rows = |l: &Link| Some(l.v.start + l.joint.quaternion_at()?);
-        let rows = self.links.iter().filter_map(rows);
-        rows.map(|rows| (rows, xi.fixed_rows::<3>(rows).into_owned()))
-    }
-
-    /// Rates of the chart coordinates at generalised velocity `v`.
-    pub fn chart_rate(&self, xi: &DVector<f64>, v: &DVector<f64>) -> DVector<f64> {
-        let [out] = self.joints(|l| [l.joint.chart_rate(l.of_v(xi), l.of_v(v))]);
-        out
-    }
-
-    /// Cotangents of `(xi, v)` of [`Tree::chart_rate`].
-    pub fn chart_rate_vjp(
-        &self,
-        xi: &DVector<f64>,
-        v: &DVector<f64>,
-        bar: &DVector<f64>,
-    ) -> (DVector<f64>, DVector<f64>) {
-        let of = |l: &Link| l.joint.chart_rate_vjp(l.of_v(xi), l.of_v(v), l.of_v(bar));
-        self.joints(|l| of(l).into()).into()
-    }
-
-    /// Tangents of [`Tree::chart_rate`] along those of xi and of v, a column for each direction.
-    pub fn chart_rate_jvp(
-        &self,
-        xi: &DVector<f64>,
-        v: &DVector<f64>,
-        xi_along: &DMatrix<f64>,
-        along: &DMatrix<f64>,
-    ) -> DMatrix<f64> {
-        let mut out = along.clone();
-        for (rows, theta) in self.rotations(xi) {
-            let rate = v.fixed_rows::<3>(rows).into_owned();
-            let unit = |k| exp_jacobian_inverse_jvp(&theta, &rate, &Vec3::ith(k, 1.0));
-            let bent = Mat3::from_columns(&[unit(0), unit(1), unit(2)]);
-            let turned = exp_jacobian_inverse(&theta) * along.fixed_rows::<3>(rows)
-                + bent * xi_along.fixed_rows::<3>(rows);
-            out.fixed_rows_mut::<3>(rows).copy_from(&turned);
-        }
-        out
-    }
-
-    /// Derivatives of [`Tree::chart_momentum`] with respect to q, xi and p̂: joint by joint, from the transposes of its entries.
-    pub fn chart_momentum_slopes(
-        &self,
-        q: &DVector<f64>,
-        xi: &DVector<f64>,
-        hat: &DVector<f64>,
-    ) -> [JointBlocks; 3] {
-        self.joint_blocks(|l, z| {
-            l.joint
-                .chart_momentum_vjp(l.of_q(q), l.of_v(xi), l.of_v(hat), z)
-        })
-    }
-
     /// X(q) of all joints, nv × nv.
     pub fn frame_matrix(&self, q: &DVector<f64>) -> DMatrix<f64> {
         let [out] = self.blocks(|l, z| [l.joint.frame_momentum_transpose(l.of_q(q), z)]);
@@ -412,32 +265,6 @@ impl Tree {
             }
         }
         out
-    }
-
-    /// Momentum conjugate to the chart coordinates `xi` around `q`, from frame momentum.
-    pub fn chart_momentum(
-        &self,
-        q: &DVector<f64>,
-        xi: &DVector<f64>,
-        hat: &DVector<f64>,
-    ) -> DVector<f64> {
-        let of = |l: &Link| l.joint.chart_momentum(l.of_q(q), l.of_v(xi), l.of_v(hat));
-        let [out] = self.joints(|l| [of(l)]);
-        out
-    }
-
-    /// Cotangents of `(q, xi, p̂)` of [`Tree::chart_momentum`].
-    pub fn chart_momentum_vjp(
-        &self,
-        q: &DVector<f64>,
-        xi: &DVector<f64>,
-        hat: &DVector<f64>,
-        z: &DVector<f64>,
-    ) -> [DVector<f64>; 3] {
-        self.joints(|l| {
-            let (q, xi, hat, z) = (l.of_q(q), l.of_v(xi), l.of_v(hat), l.of_v(z));
-            l.joint.chart_momentum_vjp(q, xi, hat, z)
-        })
     }
 
     /// Poses and columns at `q`.
@@ -481,7 +308,7 @@ impl Tree {
         let mut out: Vec<Vec6> = Vec::with_capacity(self.links.len());
         for l in &self.links {
             let base = l.parent.map_or(Vec6::zeros(), |p| out[p]);
-            out.push(base + combine(&kinematics.columns, l, v));
+            out.push(base + l.combine(&kinematics.columns, v));
         }
         out
     }
@@ -500,7 +327,7 @@ impl Tree {
             let (base, moved) = l.parent.map_or((Vec6::zeros(), Vec6::zeros()), |p| {
                 (out[p], displacements[p])
             });
-            let own = combine(&kinematics.columns, l, v);
+            let own = l.combine(&kinematics.columns, v);
             // dX v, entry by entry from the transpose.
             let mut bent = Vec6::zeros();
             let mut unit = vec![0.0; l.v.len()];
@@ -513,7 +340,7 @@ impl Tree {
             }
             // The columns move with the parent.
             let carried = cross_motion(&moved, &own);
-            out.push(base + carried + bent + combine(&kinematics.columns, l, dv));
+            out.push(base + carried + bent + l.combine(&kinematics.columns, dv));
         }
         [displacements, out]
     }
@@ -569,145 +396,4 @@ impl Tree {
         }
         out
     }
-
-    /// The four fields at velocity `v` and virtual velocity `z`.
-    pub fn fields(
-        &self,
-        kinematics: &Kinematics,
-        q: &DVector<f64>,
-        v: &DVector<f64>,
-        z: Virtual,
-    ) -> Fields {
-        let hat = |x: &DVector<f64>| self.per_frame(q, x, |j, q, x| j.frame_velocity(q, x));
-        let n = self.links.len();
-        let mut frame_bias = DVector::zeros(v.len());
-        for l in self.links.iter().filter(|l| l.joint.has_frame_map()) {
-            let own = l.joint.frame_bias(l.of_v(v));
-            frame_bias.as_mut_slice()[l.v.clone()].copy_from_slice(&own);
-        }
-        let mut f = Fields {
-            twist: Vec::with_capacity(n),
-            virtual_twist: Vec::with_capacity(n),
-            turning: Vec::with_capacity(n),
-            bias: Vec::with_capacity(n),
-            frame_bias,
-            frame_velocity: hat(v),
-            frame_virtual: match z {
-                Virtual::Frame(z) => z.clone(),
-                Virtual::User(z) => hat(z),
-            },
-        };
-        for l in &self.links {
-            let [sv, sz, sb] = own(kinematics, l, &f);
-            let zero = Vec6::zeros();
-            let (v, z, d, c) = l.parent.map_or((zero, zero, zero, zero), |p| {
-                (f.twist[p], f.virtual_twist[p], f.turning[p], f.bias[p])
-            });
-            f.turning.push(d + cross_motion(&v, &sz));
-            f.bias.push(c + cross_motion(&v, &sv) + sb);
-            f.twist.push(v + sv);
-            f.virtual_twist.push(z + sz);
-        }
-        f
-    }
-
-    /// The fields for another virtual velocity.
-    pub fn with_virtual(
-        &self,
-        kinematics: &Kinematics,
-        q: &DVector<f64>,
-        fields: &Fields,
-        z: Virtual,
-    ) -> Fields {
-        let mut f = fields.clone();
-        f.frame_virtual = match z {
-            Virtual::Frame(z) => z.clone(),
-            Virtual::User(z) => self.per_frame(q, z, |j, q, x| j.frame_velocity(q, x)),
-        };
-        for (b, l) in self.links.iter().enumerate() {
-            let sz = combine(&kinematics.frame_columns, l, &f.frame_virtual);
-            let zero = Vec6::zeros();
-            let (v, z, d) = l.parent.map_or((zero, zero, zero), |p| {
-                (f.twist[p], f.virtual_twist[p], f.turning[p])
-            });
-            f.turning[b] = d + cross_motion(&v, &sz);
-            f.virtual_twist[b] = z + sz;
-        }
-        f
-    }
-
-    /// Transpose of [`Tree::fields`]: tangent cotangents of `(q, v)` from cotangents of the fields
-    /// and the poses. With [`Virtual::User`] the dependence of ẑ = X z on q is included; the cotangent of the virtual velocity
-    /// itself is not needed by any caller and not returned.
-    pub fn reverse(
-        &self,
-        kinematics: &Kinematics,
-        v: &DVector<f64>,
-        z: Virtual,
-        fields: &Fields,
-        mut bar: Cotangents,
-    ) -> (DVector<f64>, DVector<f64>) {
-        let mut q_bar = DVector::zeros(self.velocities());
-        let mut v_bar = DVector::zeros(self.velocities());
-        for b in (0..self.links.len()).rev() {
-            let l = &self.links[b];
-            let [sv, sz, sb] = own(kinematics, l, fields);
-            let parent_twist = l.parent.map_or(Vec6::zeros(), |p| fields.twist[p]);
-            let (twist, virt, turning, bias) = (
-                bar.twist[b],
-                bar.virtual_twist[b],
-                bar.turning[b],
-                bar.bias[b],
-            );
-            let sv_bar = twist - cross_force(&parent_twist, &bias);
-            let sz_bar = virt - cross_force(&parent_twist, &turning);
-            // X is its own q's; S = Ŝ X already holds it.
-            for (column, i) in l.terms() {
-                q_bar[i] += kinematics.columns[column].dot(&bar.pose[b]);
-                v_bar[i] += kinematics.columns[column].dot(&sv_bar);
-            }
-            if l.joint.has_frame_map() {
-                let dot = |f: &Vec6| -> Vec<f64> {
-                    let columns = (l.columns.clone()).map(|k| kinematics.frame_columns[k].dot(f));
-                    columns.collect()
-                };
-                let (hat_v, hat_z, hat_b) = (dot(&sv_bar), dot(&sz_bar), dot(&bias));
-                let own_q = l.joint.frame_velocity_vjp(l.of_v(v), &hat_v);
-                let own_v = l.joint.frame_bias_vjp(l.of_v(v), &hat_b);
-                for (k, i) in l.v.clone().enumerate() {
-                    q_bar[i] += own_q[k];
-                    v_bar[i] += own_v[k];
-                }
-                if let Virtual::User(z) = z {
-                    let more_q = l.joint.frame_velocity_vjp(l.of_v(z), &hat_z);
-                    for (k, i) in l.v.clone().enumerate() {
-                        q_bar[i] += more_q[k];
-                    }
-                }
-            }
-            if let Some(p) = l.parent {
-                bar.twist[p] += twist + cross_force(&sz, &turning) + cross_force(&sv, &bias);
-                bar.virtual_twist[p] += virt;
-                bar.turning[p] += turning;
-                bar.bias[p] += bias;
-                // The columns move with the parent.
-                let own =
-                    cross_force(&sv, &sv_bar) + cross_force(&sz, &sz_bar) + cross_force(&sb, &bias);
-                let child = bar.pose[b];
-                bar.pose[p] += child + own;
-            }
-        }
-        (q_bar, v_bar)
-    }
-}
-
-/// Sum of a body's joint columns with the given coefficients.
-fn combine(columns: &[Vec6], link: &Link, x: &DVector<f64>) -> Vec6 {
-    link.terms().map(|(column, k)| columns[column] * x[k]).sum()
-}
-
-/// The joint's own contributions `Ŝ v̂`, `Ŝ ẑ`, `Ŝ (Ẋ v)`.
-fn own(kinematics: &Kinematics, l: &Link, f: &Fields) -> [Vec6; 3] {
-    let columns = &kinematics.frame_columns;
-    [&f.frame_velocity, &f.frame_virtual, &f.frame_bias].map(|x| combine(columns, l, x))
 }

@@ -21,8 +21,8 @@ pub fn rungs() -> Vec<Rung> {
         };
     }
     rungs![
-        "multibody::tree::Tree::integrate_jvp" => integrate,
-        "multibody::tree::Tree::chart_rate_jvp" => chart_rate,
+        "multibody::charts::Tree::integrate_jvp" => integrate,
+        "multibody::charts::Tree::chart_rate_jvp" => chart_rate,
         "multibody::tree::Tree::twists_jvp" => twists,
         "dynamics::integrator::readout::Stepper::velocity_jvp" => velocity,
         "dynamics::integrator::readout::Stepper::conserved_jvp" => conserved,

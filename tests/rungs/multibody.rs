@@ -17,11 +17,11 @@ pub fn rungs() -> Vec<Rung> {
         "multibody::joint::model::JointModel::chart_rate_vjp" => joint_chart_rate,
         "multibody::joint::JointMotion::frame_velocity_vjp" => joint_frame_velocity,
         "multibody::joint::JointMotion::frame_bias_vjp" => joint_frame_bias,
-        "multibody::tree::Tree::integrate_vjp" => tree_integrate,
-        "multibody::tree::Tree::chart_rate_vjp" => tree_chart_rate,
+        "multibody::charts::Tree::integrate_vjp" => tree_integrate,
+        "multibody::charts::Tree::chart_rate_vjp" => tree_chart_rate,
         "multibody::joint::model::JointModel::chart_momentum_vjp" => |c| all(joints().iter().map(|j| chart_momentum(&Tree::new([(None, Pose::identity(), j.clone())]), c))),
-        "multibody::tree::Tree::chart_momentum_vjp" => |c| chart_momentum(&tree(), c),
-        "multibody::tree::Tree::reverse" => tree_reverse,
+        "multibody::charts::Tree::chart_momentum_vjp" => |c| chart_momentum(&tree(), c),
+        "multibody::fields::Tree::reverse" => tree_reverse,
     ]
 }
 

@@ -104,8 +104,9 @@ fn built(arguments: &[&str]) -> BTreeSet<String> {
 /// The Python package is built from what the tests are, but for crates of its own: otherwise the library is compiled once more for it.
 #[test]
 fn python_and_the_tests_share_what_is_compiled() {
-    const OWN: [&str; 8] = [
+    const OWN: [&str; 9] = [
         "hydrograd-python",
+        "inventory",
         "ndarray",
         "numpy",
         "pyo3",

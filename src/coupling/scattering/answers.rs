@@ -1,14 +1,14 @@
-//! What bodies that move, or that recoil, are in the water: solves, and answers that are kept.
+//! What bodies that move are in the water: solves, and answers that are kept.
 //!
 //! An answer is linear in the twists. Of others that are known at the same poses the nearest sum is a first guess, of which a solve finds what it lacks: little where a velocity
 //! differs from a known one by known steps.
 
 use super::Scattering;
-use super::kept::{Answer, Kept, Near, Told};
+use super::kept::{Answer, Kept, Told};
 use super::levels::Levels;
 use super::quotients::Quotients;
 use super::scattered::{Scattered, plus};
-use super::unlike::{Both, count_twists, norm};
+use super::unlike::{Both, count_twists};
 use crate::adjoint::lie::Vec6;
 use crate::coupling::CouplingReport;
 use crate::coupling::reduced::FLUX;
@@ -38,64 +38,6 @@ const NEGATIVE: f64 = 1e-3;
 const UNRESOLVED: &str = "bodies are nearer than their compressed sources resolve, or overlap: keep them apart by contact, let films stand in their gaps, or give a smaller \
                           resolved_gap";
 
-/// What [`Scattered::recoil`] finds.
-#[derive(Clone, Debug)]
-pub struct Recoiled {
-    /// Impulses that others exchange with each body, body frames, unit density.
-    pub exchanged: DVector<f64>,
-    /// Those of them that bodies recoil from: not those of films that move with them ([`Own::films`]).
-    pub recoiling: DVector<f64>,
-    /// What is left of the system's equations: of the modes, then of the twists, in units of about the root of their energy.
-    pub left: Vec<f64>,
-    /// Whether there are others.
-    films: bool,
-    /// Body-frame twists.
-    twists: DVector<f64>,
-    modes: Vec<f64>,
-    /// a − Lᵀ Ĝ α.
-    lacked: Vec<f64>,
-}
-
-impl Recoiled {
-    /// What the modes do.
-    pub(super) fn modes(&self) -> &[f64] {
-        &self.modes
-    }
-
-    /// As an answer to these twists.
-    fn told(self, twists: DVector<f64>) -> Told {
-        Told {
-            exchanged: self.exchanged,
-            twists,
-            solved: self.twists,
-            modes: self.modes,
-            left: self.lacked,
-        }
-    }
-}
-
-/// How bodies recoil by themselves.
-#[derive(Clone, Copy)]
-pub struct Own<'r> {
-    /// About the root of the inertia of each body-frame twist, at unit density.
-    pub scale: &'r DVector<f64>,
-    /// What impulses (body frames, unit density) change of the twists: linear.
-    pub recoil: &'r dyn Fn(&DVector<f64>) -> DVector<f64>,
-    /// Whether the inertia that recoils has what films weigh.
-    pub films: bool,
-}
-
-/// The residual at which a solve ends, in units of about the root of an energy.
-#[derive(Clone, Copy, Debug)]
-pub enum Goal {
-    /// That of the levels.
-    Full,
-    /// Relative to what the solve starts from.
-    Relative(f64),
-    /// So much, but relative to what the solve starts from no finer than [`Goal::Full`], and no coarser than a hundredth.
-    Absolute(f64),
-}
-
 /// A sum of answers.
 struct Sum {
     twists: DVector<f64>,
@@ -107,13 +49,13 @@ struct Sum {
 /// The solution of a system, and what it makes seen: of the modes, and as impulses (body frames, unit density).
 pub(super) struct Solved {
     pub x: Vec<f64>,
-    seen: Vec<f64>,
+    pub seen: Vec<f64>,
     pub impulses: DVector<f64>,
 }
 
 impl Solved {
     /// Nothing, of the sizes of others.
-    fn none(x: &[f64], seen: &[f64], impulses: usize) -> Self {
+    pub(super) fn none(x: &[f64], seen: &[f64], impulses: usize) -> Self {
         Self {
             x: vec![0.0; x.len()],
             seen: vec![0.0; seen.len()],
@@ -214,7 +156,7 @@ impl Scattered<'_> {
     }
 
     /// The relative residuals of a solve from `right` whose absolute ones are given.
-    fn relative(&self, goal: Both, right: &[f64]) -> Both {
+    pub(super) fn relative(&self, goal: Both, right: &[f64]) -> Both {
         let (sizes, full) = (self.model.both(right), self.model.levels.tolerance);
         [0, 1].map(|k| match sizes[k] > 0.0 {
             true => (goal[k] / sizes[k]).min(COARSE).max(full),
@@ -223,7 +165,7 @@ impl Scattered<'_> {
     }
 
     /// x with x = right + f(what x makes seen), both linear, to relative residuals. What is seen of the directions of the search adds up to what is seen of x, at no further product.
-    fn solve(
+    pub(super) fn solve(
         &self,
         right: &[f64],
         goal: Both,
@@ -425,7 +367,7 @@ impl Scattered<'_> {
     }
 
     /// Looks whether the water has energy: a search finds solutions of systems that have no sense as well.
-    fn look(&self, told: &Told) {
+    pub(super) fn look(&self, told: &Told) {
         let (mut own, mut displaced) = (0.0, 0.0);
         // What the shapes have, whatever is given in the place of it.
         for (b, body) in self.model.bodies.iter().enumerate() {
@@ -441,7 +383,7 @@ impl Scattered<'_> {
         }
     }
 
-    fn keep(&self, told: impl Into<Arc<Told>>) -> Arc<Answer> {
+    pub(super) fn keep(&self, told: impl Into<Arc<Told>>) -> Arc<Answer> {
         let told = told.into();
         let charges = self.charges(&told.twists, &told.modes);
         let answer = Arc::new(Answer { charges, told });
@@ -460,118 +402,10 @@ impl Scattered<'_> {
             self.keep(told.clone());
         }
     }
-
-    /// The next to recoil begins from what was told at poses nearby, with the twists of the same motion here.
-    pub fn begin_near(&self, told: &Told, twists: DVector<f64>) {
-        let modes = told.modes.clone();
-        self.kept().near = Some(Near { twists, modes });
-    }
-
-    /// What the bodies are where impulses are given: their twists (body frames) are `first` less what they recoil from the impulses that others exchange with each.
-    /// One system with one right-hand side, to which `behind` is added if there is any,
-    /// of the modes or of modes and twists, in the units of [`Recoiled::left`]: what was left of an earlier one, or what else the modes see.
-    pub fn recoil(
-        &self,
-        first: &DVector<f64>,
-        behind: Option<&[f64]>,
-        own: &Own<'_>,
-        goal: Goal,
-    ) -> Recoiled {
-        let (m, n) = (self.model.mode_count(), first.len());
-        let unit = FLUX.sqrt();
-        let sums = self.making();
-        let Own { scale, recoil, .. } = own;
-        let exchanged = |twists: &DVector<f64>, modes: &[f64]| match own.films {
-            true => self.exchanged_beside_films(&sums, twists, modes),
-            false => self.exchanged(&sums, twists, modes),
-        };
-        // Modes and twists in units of about the root of their energy.
-        let modes = |x: &[f64]| -> Vec<f64> { x[..m].iter().map(|a| a / unit).collect() };
-        let twists = |x: &[f64]| DVector::from_fn(n, |i, _| x[m + i] / scale[i]);
-        let seen = |x: &[f64]| exchanged(&twists(x), &modes(x));
-        let next = |modes: &[f64], impulses: &DVector<f64>| -> Vec<f64> {
-            let twists = recoil(impulses);
-            let modes = modes.iter().map(|a| unit * a);
-            let twists = twists.iter().zip(scale.iter()).map(|(t, s)| -t * s);
-            modes.chain(twists).collect()
-        };
-        let mut start = vec![0.0; m];
-        start.extend(first.iter().zip(scale.iter()).map(|(t, s)| t * s));
-        if let Some(behind) = behind {
-            add(1.0, behind, &mut start);
-        }
-        let full = self.model.levels.tolerance;
-        let goal = match goal {
-            Goal::Full => [full; 2],
-            Goal::Relative(goal) => [goal; 2],
-            // Where all count alike nothing is smaller.
-            Goal::Absolute(goal) => self.relative([goal; 2], &start),
-        };
-        let near = self.kept().near.take();
-        let near = near.and_then(|Near { twists, modes }| {
-            let (own, moved) = exchanged(&twists, &modes);
-            let modes = modes.iter().map(|a| unit * a);
-            let twists = twists.iter().zip(scale.iter()).map(|(t, s)| t * s);
-            let x: Vec<f64> = modes.chain(twists).collect();
-            let right = plus(&plus(&start, 1.0, &next(&own, &moved)), -1.0, &x);
-            // No nearer than nothing is of no use; nor is what isn't a number.
-            let nearer = norm(&right) < norm(&start);
-            nearer.then_some((x, own, moved, right))
-        });
-        let Solved { x, seen, impulses } = match near {
-            None => self.solve(&start, goal, seen, next),
-            Some((x, own, moved, right)) => {
-                let (all, lacked) = (self.model.both(&start), self.model.both(&right));
-                let goal = [0, 1].map(|k| goal[k] * all[k] / lacked[k]);
-                let found = match goal.iter().any(|goal| *goal < 1.0) {
-                    true => self.solve(&right, goal, seen, next),
-                    false => Solved::none(&x, &own, moved.len()),
-                };
-                Solved {
-                    x: plus(&x, 1.0, &found.x),
-                    seen: plus(&own, 1.0, &found.seen),
-                    impulses: moved + found.impulses,
-                }
-            }
-        };
-        let left = plus(&plus(&start, 1.0, &next(&seen, &impulses)), -1.0, &x);
-        let (modes, twists) = (modes(&x), twists(&x));
-        let mut all = impulses.clone();
-        if own.films {
-            self.add_films(&twists, &mut all);
-        }
-        Recoiled {
-            lacked: plus(&modes, -1.0, &seen),
-            exchanged: all,
-            recoiling: impulses,
-            films: own.films,
-            left,
-            twists,
-            modes,
-        }
-    }
-
-    /// Keeps what recoiled as the answer to the twists that follow from it.
-    pub fn settle(&self, twists: DVector<f64>, mut recoiled: Recoiled) -> Arc<Answer> {
-        // Films pull on what the twists became, or momentum would be lost by what the search leaves times what they weigh.
-        if recoiled.films {
-            recoiled.exchanged.copy_from(&recoiled.recoiling);
-            self.add_films(&twists, &mut recoiled.exchanged);
-        }
-        let told = recoiled.told(twists);
-        self.look(&told);
-        self.keep(told)
-    }
-
-    /// Keeps what recoiled as it is, to know more of what is near it.
-    pub fn remember(&self, recoiled: Recoiled) {
-        let twists = recoiled.twists.clone();
-        self.keep(recoiled.told(twists));
-    }
 }
 
 /// `to` + `weight` x.
-fn add(weight: f64, x: &[f64], to: &mut [f64]) {
+pub(super) fn add(weight: f64, x: &[f64], to: &mut [f64]) {
     for (to, x) in to.iter_mut().zip(x) {
         *to += weight * x;
     }

@@ -1,8 +1,8 @@
 //! Derivatives of the energy of many bodies: of directions that are given by coefficients or by twists.
 
 use super::Scattering;
-use super::answers::Recoiled;
 use super::kept::Answer;
+use super::recoiled::Recoiled;
 use super::scattered::{Motions, Moving, Scattered, balance, mixed, plus};
 use crate::adjoint::lie::{Mat6, Pose, Vec6};
 use crate::boundary::PanelBoundary;

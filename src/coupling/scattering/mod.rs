@@ -37,17 +37,18 @@ mod pairs;
 mod parts;
 mod places;
 mod quotients;
+mod recoiled;
 mod scattered;
 mod spare;
 mod sums;
 mod surface;
 mod unlike;
 
-pub use answers::{Goal, Own, Recoiled};
 pub use elsewhere::{Changed, Summing, SummingAt};
 pub use kept::{Answer, Told};
 pub use levels::{Apart, Levels};
 pub use linearised::{Displaced, ScatteredLinearised};
+pub use recoiled::{Goal, Own, Recoiled};
 pub use scattered::{Motions, Scattered};
 
 use super::Exclusions;

@@ -3,6 +3,7 @@
 //! A fidelity is a file here that implements [`kind::FidelityKind`], its `mod` line, and its line in the list.
 
 mod auto;
+mod compressed;
 mod full;
 mod given;
 mod isolated;

@@ -1,19 +1,17 @@
 //! Every derivative rung of this crate with its check.
 
+mod contact;
+mod solve;
+
 use crate::check::{Outcome, Rung, dot, outcome};
-use crate::contact::{
-    Law, PointState, Push, Rates, contact_force, contact_force_jvp, contact_force_vjp,
-};
 use crate::drag::{Element, Part, Surface, quadratic_drag, quadratic_drag_jvp, quadratic_drag_vjp};
 use crate::draw::numbers;
 use crate::lie::{
     Mat6, Vec3, Vec6, exp_jacobian_inverse, exp_jacobian_inverse_jvp, exp_jacobian_inverse_vjp,
 };
 use crate::rigid::{spatial_inertia, spatial_inertia_vjp};
-use crate::solve::{Definite, Fitted, Moved, least_squares, least_squares_jvp};
 use crate::stream::{Stream, stream_wrench, stream_wrench_jvp, stream_wrench_vjp};
 use crate::waterline::{Below, Hull};
-use nalgebra::{DMatrix, DVector};
 
 /// Largest accepted relative error.
 const TOLERANCE: f64 = 1e-6;
@@ -64,19 +62,19 @@ pub fn rungs() -> Vec<Rung> {
         },
         Rung {
             name: "contact::contact_force_jvp",
-            check: contact_force_jvp_check,
+            check: contact::contact_force_jvp_check,
         },
         Rung {
             name: "contact::contact_force_vjp",
-            check: contact_force_vjp_check,
+            check: contact::contact_force_vjp_check,
         },
         Rung {
             name: "solve::Definite::solve_vjp",
-            check: solve_vjp_check,
+            check: solve::solve_vjp_check,
         },
         Rung {
             name: "solve::least_squares_jvp",
-            check: least_squares_jvp_check,
+            check: solve::least_squares_jvp_check,
         },
     ]);
     out
@@ -343,219 +341,6 @@ fn below_vjp_check(corruption: f64) -> Outcome {
         },
         corruption,
     )
-}
-
-/// Gap, weight, normal, velocity, stiffness, dissipation and friction in one row: setting in, pressed, sticking,
-/// sliding, and parting near the speed at which nothing presses.
-const CONTACTS: [[f64; 11]; 4] = [
-    [0.021, 0.8, 0.36, -0.48, 0.8, 0.3, 0.2, -0.1, 3e3, 0.4, 0.6],
-    [
-        0.008, 1.0, 0.8, 0.36, -0.48, -0.03, 0.02, -0.01, 3e3, 0.4, 0.6,
-    ],
-    [-0.03, 1.0, 0.6, 0.0, 0.8, -0.9, 0.4, -0.3, 3e3, 0.4, 0.6],
-    [-0.08, 0.5, 0.0, 0.6, 0.8, 0.1, 0.9, 2.2, 3e3, 0.5, 0.2],
-];
-
-/// How the body turns, and torsional and rolling friction: each with each of [`CONTACTS`].
-const TURNING: [[f64; 5]; 4] = [
-    [0.3, -0.7, 0.4, 0.03, 0.05],
-    [-0.02, 0.01, 0.03, 0.1, 0.02],
-    [0.0, 0.0, 0.0, 0.04, 0.01],
-    [0.1, 0.2, -0.1, 0.02, 0.03],
-];
-
-/// Numbers of a contact: those of [`CONTACTS`], then of [`TURNING`].
-const NUMBERS: usize = 16;
-
-fn contacts() -> Vec<[f64; NUMBERS]> {
-    let joined = |(x, y): ([f64; 11], [f64; 5])| {
-        std::array::from_fn(|i| if i < 11 { x[i] } else { y[i - 11] })
-    };
-    let each = CONTACTS
-        .into_iter()
-        .flat_map(|x| TURNING.map(|y| (x, y)))
-        .map(joined);
-    each.collect()
-}
-
-fn three(x: &[f64]) -> Vec3 {
-    Vec3::from_column_slice(&x[..3])
-}
-
-fn contact(x: &[f64]) -> (Law, PointState) {
-    let law = Law {
-        stiffness: x[8],
-        dissipation: x[9],
-        friction: x[10],
-        torsional_friction: x[14],
-        rolling_friction: x[15],
-        stiction_speed: 0.05,
-        stiction_spin: 0.2,
-        gap: 0.02,
-        width: 5e-3,
-        horizon: 0.01,
-    };
-    let point_state = PointState {
-        gap: x[0],
-        weight: x[1],
-        normal: three(&x[2..]),
-        rates: Rates {
-            velocity: three(&x[5..]),
-            spin: three(&x[11..]),
-        },
-    };
-    (law, point_state)
-}
-
-fn pushed(push: &Push) -> Vec<f64> {
-    push.force.iter().chain(&push.torque).copied().collect()
-}
-
-fn contact_force_jvp_check(corruption: f64) -> Outcome {
-    all(contacts().into_iter().flat_map(|x| {
-        let (law, point_state) = contact(&x);
-        let at = point_state.rates;
-        let value = |u: &[f64]| {
-            let rates = Rates {
-                velocity: three(u),
-                spin: three(&u[3..]),
-            };
-            pushed(&contact_force(
-                &law,
-                &PointState {
-                    rates,
-                    ..point_state
-                },
-            ))
-        };
-        let along = |d: [f64; 6]| {
-            let rates = Rates {
-                velocity: three(&d),
-                spin: three(&d[3..]),
-            };
-            let jvp = pushed(&contact_force_jvp(&law, &point_state, &rates));
-            let jvp: Vec<f64> = jvp.iter().map(|x| corruption * x).collect();
-            let (u, w) = (at.velocity, at.spin);
-            let start = [u.x, u.y, u.z, w.x, w.y, w.z];
-            outcome(value, &start, &d, &jvp, TOLERANCE)
-        };
-        (70..78)
-            .map(|seed| along(array(seed, 0.01)))
-            .collect::<Vec<_>>()
-    }))
-}
-
-fn contact_force_vjp_check(corruption: f64) -> Outcome {
-    all(contacts().into_iter().map(|x| {
-        let (law, point_state) = contact(&x);
-        // In units of each argument's own size.
-        let mut size = [0.01; NUMBERS];
-        size[1..5].fill(0.1);
-        size[8..11].copy_from_slice(&[1e3, 0.1, 0.1]);
-        let value = |y: &[f64]| {
-            let row: [f64; NUMBERS] = std::array::from_fn(|i| x[i] + size[i] * y[i]);
-            let (law, point_state) = contact(&row);
-            pushed(&contact_force(&law, &point_state))
-        };
-        let bars = |bar: &[f64]| {
-            let bar = Push {
-                force: three(bar),
-                torque: three(&bar[3..]),
-            };
-            let b = contact_force_vjp(&law, &point_state, &bar);
-            let mut bars = vec![b.gap, b.weight];
-            bars.extend(b.normal.iter().chain(&b.rates.velocity));
-            bars.extend([b.stiffness, b.dissipation, b.friction]);
-            bars.extend(&b.rates.spin);
-            bars.extend([b.torsional_friction, b.rolling_friction]);
-            bars.iter().zip(size).map(|(b, size)| b * size).collect()
-        };
-        transposed::<NUMBERS>(value, &[0.0; NUMBERS], bars, corruption)
-    }))
-}
-
-fn matrix(seed: u64, rows: usize, columns: usize, size: f64) -> DMatrix<f64> {
-    DMatrix::from_vec(rows, columns, numbers(seed, rows * columns, size))
-}
-
-/// A definite matrix and its right-hand side along a line: with the tangents of both.
-struct Line {
-    a: [DMatrix<f64>; 2],
-    b: [DVector<f64>; 2],
-}
-
-impl Line {
-    fn new(seed: u64) -> Self {
-        let root = matrix(seed, 6, 6, 1.0);
-        let da = matrix(seed + 1, 6, 6, 0.1);
-        Self {
-            a: [
-                &root * root.transpose() + 0.5 * DMatrix::identity(6, 6),
-                &da + da.transpose(),
-            ],
-            b: [2, 3].map(|k| DVector::from_vec(numbers(seed + k, 6, 1.0))),
-        }
-    }
-
-    fn solve(&self, h: f64) -> DVector<f64> {
-        let b = &self.b[0] + h * &self.b[1];
-        self.factor(h).solve(&b)
-    }
-
-    fn factor(&self, h: f64) -> Definite {
-        Definite::new(&self.a[0] + h * &self.a[1]).expect("a definite matrix")
-    }
-}
-
-/// Several lines, each with a cotangent of the solution.
-fn lines() -> impl Iterator<Item = (Line, DVector<f64>)> {
-    [300, 310, 320, 330].into_iter().map(|seed| {
-        let x_bar = numbers(seed + 4, 6, 1.0);
-        (Line::new(seed), DVector::from_vec(x_bar))
-    })
-}
-
-fn solve_vjp_check(corruption: f64) -> Outcome {
-    all(lines().map(|(line, x_bar)| {
-        let (x, w) = (line.solve(0.0), line.factor(0.0).solve_vjp(&x_bar));
-        let slope = w.dot(&line.b[1]) - w.dot(&(&line.a[1] * x));
-        let value = |h: &[f64]| vec![line.solve(h[0]).dot(&x_bar)];
-        outcome(value, &[0.0], &[1.0], &[corruption * slope], TOLERANCE)
-    }))
-}
-
-/// All four of the solutions, as K and both right-hand sides move.
-fn least_squares_jvp_check(corruption: f64) -> Outcome {
-    let (m, n, columns) = (12, 6, 2);
-    let k = [matrix(90, m, n, 1.0), matrix(91, m, n, 0.1)];
-    let f = [matrix(92, m, columns, 1.0), matrix(93, m, columns, 1.0)];
-    let g = [matrix(94, n, columns, 1.0), matrix(95, n, columns, 1.0)];
-    let at = |of: &[DMatrix<f64>; 2], h: f64| &of[0] + h * &of[1];
-    let damping = DMatrix::from_diagonal_element(n, n, 0.3);
-    let normal = |k: &DMatrix<f64>, b: &DMatrix<f64>| {
-        let factor = (k.tr_mul(k) + &damping).cholesky().ok_or(());
-        factor.map(|factor| (factor.solve(b), ()))
-    };
-    let solve = |h: f64| {
-        let k = at(&k, h);
-        let solved = least_squares(&k, |b| normal(&k, b), &at(&f, h), &at(&g, h));
-        solved.expect("a definite matrix").0
-    };
-    let list = |s: &Fitted<DMatrix<f64>>| {
-        let parts = [&s.a, &s.lambda, &s.r, &s.mu];
-        parts.iter().flat_map(|p| p.iter().copied()).collect()
-    };
-    let start = solve(0.0);
-    let moved = Moved {
-        a: &(&k[1] * &start.a - &f[1]),
-        lambda: &(&k[1] * &start.lambda),
-        r: &k[1].tr_mul(&start.r),
-        g: &(&g[1] - k[1].tr_mul(&start.mu)),
-    };
-    let tangent = least_squares_jvp(&k[0], |b| normal(&k[0], b), &moved);
-    let tangent: Vec<f64> = list(&tangent.expect("a definite matrix").0);
-    let tangent: Vec<f64> = tangent.iter().map(|t| corruption * t).collect();
-    outcome(|h| list(&solve(h[0])), &[0.0], &[1.0], &tangent, TOLERANCE)
 }
 
 #[cfg(test)]

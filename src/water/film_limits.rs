@@ -1,7 +1,7 @@
 //! Limits of thin films.
 
 use crate::adjoint::lie::{Pose, Vec3, exp_matrix};
-use crate::coupling::film::{Film, FilmSurface, NoFilm, PlacedFilm, Shares, Side};
+use crate::coupling::film::{Between, Film, FilmSurface, NoFilm, PlacedFilm, Shares, Side};
 use crate::geometry::{HalfSpace, Image, Opposite, Wall};
 use crate::scene::Shape;
 use crate::shape;
@@ -23,12 +23,14 @@ fn over_wall(shape: &Shape, faces: usize, floor: f64) -> Arc<Film> {
     let shares = Shares {
         floor: 0.25,
         floor_at_edges: 0.25,
+        floor_between_faces: 0.25,
         rim: 0.43,
         rim_to_wall: 0.65,
+        farther_between_faces: 1.0,
         in_corners: true,
     };
     let reach = shares.reach(&other, between.0.size, 4.0 * floor);
-    Arc::new(Film::new(0, other, between, reach, &shares, true))
+    Arc::new(Film::new(0, other, between, reach, &shares, Between::Edges))
 }
 
 /// What the film adds to the energy of a unit twist (component `k` in the body's frame, about its origin) at a pose, and its slope as the body rises.

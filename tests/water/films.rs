@@ -292,3 +292,50 @@ fn what_films_do_not_do_is_said() {
         assert_eq!(found, told, "{warnings}");
     }
 }
+
+/// A block that turns about the normal over the rim of a plate: what a force does at the largest of its steps between 300 angles goes to nothing as the step does.
+#[test]
+fn films_over_a_rim_feel_no_jump() {
+    for (thickness, gap, offset) in [(0.02, 3e-3, 0.17), (0.04, 3e-3, 0.17), (0.02, 2e-3, 0.16)] {
+        let mut scene = Scene::new(unit_water());
+        let plate = Shape::cuboid([0.4, 0.4, 0.02]).faces(600);
+        scene.add(Body::new(plate).density(1.5).joint(Joint::Fixed));
+        let block = Shape::cuboid([0.1, 0.1, thickness]).faces(200);
+        let height = 0.01 + 0.5 * thickness + gap;
+        scene.add(Body::new(block).density(1.5).at([offset, 0.0, height]));
+        let simulator = Simulator::new(&scene, films()).unwrap();
+        let v = DVector::from_vec(vec![0.1, 0.05, 0.3, 0.5, 0.7, 0.3]);
+        let acceleration = |angle: f64| {
+            let mut xi = DVector::zeros(6);
+            xi[5] = angle;
+            let q = simulator.integrate(simulator.start().0, &xi).unwrap();
+            let equations = simulator.equations(&q).unwrap();
+            let none = DVector::zeros(6);
+            let found = equations.acceleration(&v, &simulator.no_control(), &none, &none);
+            found.unwrap()
+        };
+        let angles: Vec<f64> = (0..300).map(|k| 5e-3 * f64::from(k)).collect();
+        let all: Vec<DVector<f64>> = angles.iter().map(|a| acceleration(*a)).collect();
+        let step = |k: &usize| (&all[k + 1] - &all[*k]).norm();
+        let mut worst: Vec<usize> = (0..angles.len() - 1).collect();
+        worst.sort_by(|a, b| step(b).total_cmp(&step(a)));
+        for k in &worst[..2] {
+            let (mut low, mut high) = (angles[*k], angles[k + 1]);
+            let (mut at_low, mut at_high) = (all[*k].clone(), all[k + 1].clone());
+            for _ in 0..24 {
+                let middle = 0.5 * (low + high);
+                let at = acceleration(middle);
+                match (&at - &at_low).norm() > (&at_high - &at).norm() {
+                    true => (high, at_high) = (middle, at),
+                    false => (low, at_low) = (middle, at),
+                }
+            }
+            let jump = (&at_high - &at_low).norm() / at_low.norm();
+            println!("{thickness}, {gap}, {offset}: {jump:.1e} at {low}");
+            assert!(
+                jump < 1e-7,
+                "{jump} at {low} of {thickness}, {gap}, {offset}"
+            );
+        }
+    }
+}

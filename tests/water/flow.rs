@@ -270,7 +270,7 @@ fn points_that_are_not_resolved_are_refused() {
 
     // Beside a sharp edge, and where another surface is near as well.
     let mut boxes = Scene::new(Fluid::fresh_water());
-    for x in [0.0, 1.07] {
+    for x in [0.0, 1.13] {
         boxes.add(
             Body::new(Shape::cuboid([1.0; 3]))
                 .density(900.0)
@@ -279,7 +279,7 @@ fn points_that_are_not_resolved_are_refused() {
     }
     let simulator = self::simulator(&boxes, 1280, Method::Panel);
     // In the middle of a side nothing else is near.
-    let points = [[0.0, 0.51, 0.51], [0.535, 0.0, 0.0], [0.0, 0.53, 0.0]].map(Vec3::from);
+    let points = [[0.0, 0.51, 0.51], [0.565, 0.0, 0.0], [0.0, 0.53, 0.0]].map(Vec3::from);
     let controls = Controls::zeros(&simulator, 0);
     let rollout = simulator.rollout(&controls).unwrap();
     let resolved = rollout.flow_resolved(0, &points).unwrap();

@@ -63,6 +63,11 @@ impl FilmBody {
 }
 
 impl FilmBody {
+    /// Whether it has a flat part that counts as one.
+    pub(super) fn has_face(&self) -> bool {
+        self.face.is_some()
+    }
+
     /// How far it goes on, from 0 to 1, beside the film of another body that is opposite, which reaches as far around that one as `rim` (m): the face of a like block ends where the other's
     /// does. By both sizes alone, so that it changes nothing as bodies move.
     pub(super) fn goes_on_beside(&self, other: &Self, rim: f64) -> f64 {

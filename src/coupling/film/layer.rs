@@ -22,7 +22,7 @@ const STEEP: f64 = 8.0;
 const COSINE: [f64; 3] = [-0.5, -1.0 / 8.0, -1.0 / 16.0];
 /// Square of the sine between the two sides from which on a face lies beside what is opposite rather than over it; at 1 it does altogether.
 const BESIDE: f64 = 0.5;
-/// Largest square of a sine that elements may give to rounding and their own size.
+/// Square of a sine to which what elements give beyond 1, by their own size, goes over.
 const STEEPEST: f64 = 1.2;
 
 /// A film between a surface and what is opposite.
@@ -334,15 +334,29 @@ fn inverse<D: Jet>(w: D, bulge: f64) -> [D; 2] {
     ]
 }
 
-/// |∇d|² on a face, and its derivative.
+/// |∇d|² on a face, bounded, and its derivative.
 fn steepness<D: Jet>(d: &[D; 3], face: &Element) -> (D, [D; 3]) {
     let s = &face.slopes;
     let along = [0, 1, 2].map(|i| d[0] * s[(i, 0)] + d[1] * s[(i, 1)] + d[2] * s[(i, 2)]);
-    let steep = product(d, &along);
-    match steep.re() > STEEPEST {
-        true => (D::from(STEEPEST), zero()),
-        false => (steep, along.map(|x| x * 2.0)),
+    let [steep, slope] = bounded(product(d, &along));
+    (steep, along.map(|x| slope * x * 2.0))
+}
+
+/// What it was up to 1, [`STEEPEST`] in the end, and its derivative: three times continuously differentiable.
+fn bounded<D: Jet>(square: D) -> [D; 2] {
+    const WIDTH: f64 = 2.0 * (STEEPEST - 1.0);
+    let t = (square - 1.0) * (1.0 / WIDTH);
+    if t.re() <= 0.0 {
+        return [square, D::from(1.0)];
     }
+    if t.re() >= 1.0 {
+        return [D::from(STEEPEST), D::from(0.0)];
+    }
+    let cube = t * t * t;
+    [
+        (t - cube * t * (t * (t - 3.0) + 2.5)) * WIDTH + 1.0,
+        -(cube * (t * (t * 6.0 - 15.0) + 10.0)) + 1.0,
+    ]
 }
 
 /// An arc's length in its height, and its derivative, of a square of a sine.

@@ -59,21 +59,26 @@ pub(crate) struct Shares {
     pub floor: f64,
     /// The same where one of them may have edges: meshes whose shape isn't known by formula are among them.
     pub floor_at_edges: f64,
+    /// The same between two bodies with flat faces.
+    pub floor_between_faces: f64,
     /// Where the flow in a film begins to go over into that around the bodies, in sizes of the first; it has at twice that. What holds bodies apart does so to all that
     /// isn't film as well, so this is where the rest of the added mass changes least with the gap: by spheres, capsules and an edge (docs/accuracy-coupled.md). Between flat
     /// faces it makes no difference.
     pub rim: f64,
     /// The same between a body and a wall.
     pub rim_to_wall: f64,
+    /// How much farther films between two bodies with flat faces reach: the faces of one don't meet those of the other, as those of a body meet their own images at a wall.
+    pub farther_between_faces: f64,
     /// Whether bodies with flat faces have films at walls of which there are several: in a corner each takes the other's gap for the open.
     pub in_corners: bool,
 }
 
 impl Shares {
-    fn floor(&self, edged: bool) -> f64 {
-        match edged {
-            true => self.floor_at_edges,
-            false => self.floor,
+    fn floor(&self, between: Between) -> f64 {
+        match between {
+            Between::Round => self.floor,
+            Between::Edges => self.floor_at_edges,
+            Between::Faces => self.floor_between_faces,
         }
     }
 
@@ -91,6 +96,17 @@ impl Shares {
     pub fn reach(&self, other: &Side, size: f64, resolved: f64) -> f64 {
         self.rims(other, size)[1].min(resolved)
     }
+}
+
+/// What a film is between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Between {
+    /// Shapes without edges.
+    Round,
+    /// Two of which one may have edges: meshes whose shape isn't known by formula are among them.
+    Edges,
+    /// Two bodies that both have flat faces.
+    Faces,
 }
 
 /// Where a film is.
@@ -140,7 +156,7 @@ impl Film {
         (surface, opposite): (Arc<FilmSurface>, Arc<Opposite>),
         reach: f64,
         shares: &Shares,
-        edged: bool,
+        between: Between,
     ) -> Self {
         let rim = shares.rims(&other, surface.size);
         Self {
@@ -149,7 +165,7 @@ impl Film {
             surface,
             opposite,
             width: Width {
-                floor: shares.floor(edged) * reach,
+                floor: shares.floor(between) * reach,
                 reach,
             },
             rim,

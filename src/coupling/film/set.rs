@@ -2,7 +2,7 @@
 
 use super::bodies::FilmBody;
 use super::placed::{MovingFilm, PlacedFilm};
-use super::{Apart, Beside, Extent, Film, NoFilm, Shares, Side};
+use super::{Apart, Beside, Between, Extent, Film, NoFilm, Shares, Side};
 use crate::adjoint::lie::{Pose, Vec6};
 use crate::coupling::Exclusions;
 use crate::error::in_order;
@@ -116,6 +116,20 @@ impl Films {
         all.map(|(a, b)| Place::Bodies(a, b))
     }
 
+    /// What a film of a body is between.
+    fn kind(&self, body: usize, other: Side) -> Between {
+        let own = &self.bodies[body];
+        let other = match other {
+            Side::Body(b) => Some(&self.bodies[b]),
+            Side::Wall(_) => None,
+        };
+        match other {
+            Some(other) if own.has_face() && other.has_face() => Between::Faces,
+            other if own.flat || other.is_some_and(|other| other.flat) => Between::Edges,
+            _ => Between::Round,
+        }
+    }
+
     /// The body on whose faces it is solved, what is opposite, and the gap from which on it is there, m.
     fn between(&self, place: Place) -> (usize, Side, f64) {
         let (body, other, reach) = match place {
@@ -125,7 +139,11 @@ impl Films {
                 let larger = self.bodies[b].surface.size < self.bodies[a].surface.size;
                 let (own, other) = if larger { (b, a) } else { (a, b) };
                 let reach = self.reaches[a].max(self.reaches[b]);
-                (own, Side::Body(other), reach)
+                let farther = match self.kind(own, Side::Body(other)) {
+                    Between::Faces => self.shares.farther_between_faces,
+                    Between::Edges | Between::Round => 1.0,
+                };
+                (own, Side::Body(other), farther * reach)
             }
         };
         let size = self.bodies[body].surface.size;
@@ -159,14 +177,25 @@ impl Films {
     pub fn widest(&self) -> f64 {
         match self.is_empty() {
             true => 0.0,
-            false => self.reaches.iter().copied().fold(0.0, f64::max),
+            false => (0..self.bodies.len())
+                .map(|b| self.farthest(b))
+                .fold(0.0, f64::max),
+        }
+    }
+
+    /// The gap from which on a body has no film, whatever is opposite, m.
+    fn farthest(&self, b: usize) -> f64 {
+        match self.bodies[b].has_face() {
+            true => self.shares.farther_between_faces * self.reaches[b],
+            false => self.reaches[b],
         }
     }
 
     /// Where gaps may be narrow at these poses, in order.
     fn near(&self, poses: &[Pose]) -> Vec<Place> {
-        let regions = self.bodies.iter().zip(poses).zip(&self.reaches);
-        let regions = regions.map(|((body, pose), reach)| Some(body.casing.region(pose, *reach)));
+        let regions = self.bodies.iter().zip(poses).enumerate();
+        let regions =
+            regions.map(|(b, (body, pose))| Some(body.casing.region(pose, self.farthest(b))));
         let pairs = Neighbours::new(regions.collect());
         let apart = |a: usize, b: usize| {
             let [x, y] = [a, b].map(|b| &self.bodies[b].casing);
@@ -215,9 +244,8 @@ impl Films {
             (Side::Body(b), _) | (_, Place::Bodies(_, b)) => &self.bodies[b].opposite,
         };
         let between = (self.bodies[body].surface.clone(), opposite.clone());
-        let edged = self.bodies[body].flat || matches!(other, Side::Body(b) if self.bodies[b].flat);
-        let shares = &self.shares;
-        let film = Film::new(body, other, between, reach, shares, edged);
+        let kind = self.kind(body, other);
+        let film = Film::new(body, other, between, reach, &self.shares, kind);
         Arc::new(match other {
             Side::Body(b) => film.beside(&self.bodies[body], &self.bodies[b]),
             Side::Wall(_) => film,

@@ -22,8 +22,11 @@ const REACH: f64 = 0.5;
 const SHARES: Shares = Shares {
     floor: 0.25,
     floor_at_edges: 0.25,
+    floor_between_faces: 0.5,
     rim: 0.37,
     rim_to_wall: 0.55,
+    // Faces that are shifted or turned against each other need more room, those of the coarser mesh even more.
+    farther_between_faces: 2.0,
     // Panels are no worse there.
     in_corners: false,
 };

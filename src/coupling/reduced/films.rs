@@ -19,8 +19,10 @@ const SHARES: Shares = Shares {
     floor: 0.25,
     // What compressed bodies with edges answer to sources nearer than that may be more than a body can: I − LᵀGL isn't positive definite then.
     floor_at_edges: 0.5,
+    floor_between_faces: 0.5,
     rim: 0.43,
     rim_to_wall: 0.65,
+    farther_between_faces: 1.0,
     in_corners: true,
 };
 

@@ -34,7 +34,8 @@ def _needs(module: str, what: str) -> Any:
 
 
 def to_pandas(rollout: Rollout) -> pandas.DataFrame:
-    """The states 0 … N as a table with the time (s) as its index: coordinates and velocities by name, energy, momenta, smallest gap; SI units.
+    """The states 0 … N as a table with the time (s) as its index: coordinates and velocities by name, energy, momenta of all together, smallest gap, and the controls that acted from
+    there on by name (NaN at the last state); SI units.
 
     It has the columns of `Rollout.to_dict` and needs pandas.
     """
@@ -52,7 +53,8 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
     """All of a rollout as labelled arrays with units in their attributes; needs xarray.
 
     `q` (time, coordinate) and `v` (time, velocity) by their names; of each body `positions`, `velocities` (of its origin, then angular; world axes),
-    `angular_momentum` and `contact_forces` (time, body, axis), and `rotations` (time, body, row, column); `kinetic_energy`, `potential_energy`, `min_gap` (time);
+    `angular_momentum` and `contact_forces` (time, body, axis), and `rotations` (time, body, row, column); of all of it `momentum` (time, direction: linear, then angular about
+    the world's origin), `kinetic_energy`, `potential_energy`, `min_gap` (time);
     `controls` (step, control) by their names, each with its `control_unit`, and `applied_controls`, which hold the controller's as well.
     """
     xarray = _needs("xarray", "to_xarray")
@@ -61,6 +63,7 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
         "q": (("time", "coordinate"), rollout.q, {"units": "m, rad, unit quaternions"}),
         "v": (("time", "velocity"), rollout.v, {"units": "m/s, rad/s"}),
         "rotations": (("time", "body", "row", "column"), rollout.rotations, {"units": "1"}),
+        "momentum": (("time", "direction"), rollout.momentum, {"units": "kg m/s, kg m²/s"}),
         "kinetic_energy": (("time",), rollout.kinetic_energy, {"units": "J"}),
         "potential_energy": (("time",), rollout.potential_energy, {"units": "J"}),
         "min_gap": (("time",), rollout.min_gap, {"units": "m"}),
@@ -71,6 +74,7 @@ def to_xarray(rollout: Rollout) -> xarray.Dataset:
         "time": ("time", rollout.time, {"units": "s"}),
         "coordinate": sim.q_names,
         "velocity": sim.v_names,
+        "direction": ["px", "py", "pz", "lx", "ly", "lz"],
         "body": sim.body_names,
         "control": sim.control_names,
         "control_unit": ("control", sim.control_units),

@@ -23,6 +23,8 @@ def test_pandas(rollout):
     assert list(table.index) == list(rollout.time) and table.index.name == "time"
     assert np.array_equal(table["palm.position"], rollout.q[:, 0])
     assert np.array_equal(table["pebble.rate"], rollout.v[:, -1])
+    acted = table[rollout.simulator.control_names].to_numpy()
+    assert np.array_equal(acted[:-1], rollout.applied_controls) and np.isnan(acted[-1]).all()
 
 
 def test_xarray(rollout):
@@ -31,6 +33,7 @@ def test_xarray(rollout):
     assert np.array_equal(data.q.sel(coordinate="pebble.z"), rollout.q[:, 4])
     assert np.array_equal(data.positions.sel(body="pebble"), rollout.positions[:, 3])
     assert np.array_equal(data.velocities.sel(body="palm", component="vz"), rollout.velocities[:, 0, 2])
+    assert np.array_equal(data.momentum.sel(direction="lz"), rollout.momentum[:, 5])
     forces = rollout.observe("contact_forces")
     assert np.nanmax(np.abs(forces)) > 0.0  # the pebble lies on the floor
     assert np.array_equal(data.contact_forces, forces, equal_nan=True)

@@ -239,8 +239,16 @@ def test_springs_and_screws():
         slope = (value(base + step) - value(base - step)) / (2 * step)
         assert found[name] == pytest.approx(slope, rel=1e-6), name
     assert hg.Scene.from_toml(scene.to_toml()) == scene
-    with pytest.raises(hg.InputError, match="lenght"):
-        scene.add_force("spring", body="nut", stiffness=1.0, lenght=2.0)
+    for keys, says in (
+        ({"stiffness": 1.0, "lenght": 2.0}, r"has no key `lenght`; did you mean `length`\?"),
+        ({"stiffness": "firm"}, 'stiffness: invalid type: string "firm", expected a number'),
+        ({}, "lacks the key `stiffness`"),
+        ({"stiffness": 1.0, "at": [0.0, 1.0]}, "at: invalid length 2, expected a list of length 3"),
+    ):
+        with pytest.raises(hg.InputError, match=says):
+            scene.add_force("spring", body="nut", **keys)
+    with pytest.raises(hg.InputError, match="`sprng` is not known; did you mean `spring`"):
+        scene.add_force("sprng", body="nut")
     with pytest.raises(hg.InputError, match="screw: axis"):
         hg.screw((0, 0), 0.1)
 

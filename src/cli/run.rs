@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -27,7 +28,7 @@ use crate::{Error, Result};
 pub(super) struct Arguments {
     #[command(flatten)]
     simulation: Simulation,
-    /// Folder for trajectory.csv and trajectory.json: time, q, v, energy, momentum, smallest gap
+    /// Folder for trajectory.csv and trajectory.json: time, q, v, energy, momentum, smallest gap, controls that acted
     /// [default: none are written]. Of a run that is interrupted (Ctrl-C) or fails in a step they hold what ran.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -284,6 +285,13 @@ fn simulate(
         Some(e) => simulator.resume(e.state(), &e.path().display().to_string())?,
         None => simulator.initial().map_err(|e| e.at_time(0.0))?,
     };
+    if let Some(earlier) = earlier {
+        // A file with other rows is refused before the run, which would be lost after it.
+        let begun = simulator.rollout_from(&state, &Controls::zeros(&simulator, 0), |_| {
+            ControlFlow::Continue(())
+        })?;
+        earlier.put_before(&mut Recording::of(scene, &begun)?)?;
+    }
     let before = state.step;
     let Some(steps) = scene.steps.checked_sub(before) else {
         return Err(Error::input(

@@ -202,12 +202,6 @@ impl Evaluation<'_> {
         out
     }
 
-    /// Potential energy of all forces that have one, J.
-    pub fn potential_energy(&self) -> f64 {
-        let forces = self.system.forces.iter();
-        forces.map(|f| f.potential_energy(&self.place())).sum()
-    }
-
     /// Adds W ×* I (V − W), of bodies that move by `drifting` relative to W.
     fn add_drift(&self, drifting: &[Vec6], rates: &mut [Vec6]) {
         for (b, rate) in rates.iter_mut().enumerate() {

@@ -319,6 +319,24 @@ impl<'a> Evaluation<'a> {
         0.5 * twice
     }
 
+    /// Potential energy of all forces that have one, J.
+    pub fn potential_energy(&self) -> f64 {
+        let forces = self.system.forces.iter();
+        forces.map(|f| f.potential_energy(&self.place())).sum()
+    }
+
+    /// What forces displace beside the volumes of the bodies, less what of these is out of the water: the volume, m³, and its moment about the world's origin, m⁴.
+    pub fn displaced(&self) -> (f64, Vec3) {
+        let each = self
+            .system
+            .forces
+            .iter()
+            .map(|f| f.displaced(&self.place()));
+        each.fold((0.0, Vec3::zeros()), |(all, moment), (volume, of)| {
+            (all + volume, moment + of)
+        })
+    }
+
     /// What the coupling reports.
     pub fn report(&self) -> CouplingReport {
         match self.scattered() {

@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
 
 use super::problem::{Problem, Reader};
-use super::{Body, Origin, Scene};
+use super::{Body, Fluid, Force, Origin, Scene};
 use crate::{Error, Result};
 
 /// Stands for the file of a scene that is read from text.
@@ -48,6 +48,34 @@ impl Scene {
                 "every number must fit a TOML number (whole numbers below 2^63)",
             )
         })
+    }
+}
+
+impl Force {
+    /// A force from the keys that it has in a scene file, "kind" among them, as a JSON object; a key whose value is null is as if it weren't there.
+    ///
+    /// # Errors
+    /// Keys that don't fit, as those of a scene file are told: which, and what would.
+    pub fn from_json(keys: &str) -> Result<Self> {
+        let refused = |message: String| parse_error(Path::new("force"), message);
+        let table = serde_json::from_str::<serde_json::Map<String, serde_json::Value>>(keys);
+        let mut table = table.map_err(|e| refused(e.to_string()))?;
+        table.retain(|_, value| !value.is_null());
+        let table = Value::try_from(table).map_err(|e| refused(e.to_string()))?;
+        // A force is read as it is in a scene.
+        let scene = Scene::new(Fluid::fresh_water());
+        let mut values = Value::try_from(scene).map_err(|e| refused(e.to_string()))?;
+        if let Value::Table(keys) = &mut values {
+            keys.insert("forces".into(), Value::Array(vec![table]));
+        }
+        match read(values.clone()) {
+            Ok(mut scene) => (scene.forces.pop()).ok_or_else(|| refused("none was read".into())),
+            Err((path, problem)) => {
+                let (_, message) = told(&values, path, &problem);
+                let message = message.replacen("forces[0].", "", 1);
+                Err(refused(message.replacen("forces[0]", "it", 1)))
+            }
+        }
     }
 }
 
@@ -211,10 +239,16 @@ fn read(values: Value) -> std::result::Result<Scene, (Vec<Step>, Problem)> {
 fn explain(
     document: &DeTable<'_>,
     values: &Value,
-    mut path: Vec<Step>,
+    path: Vec<Step>,
     problem: &Problem,
     line: impl Fn(usize) -> usize,
 ) -> String {
+    let (path, message) = told(values, path, problem);
+    format!("line {}: {message}", line(start(document, &path)))
+}
+
+/// The same without the line: the path to what doesn't fit, and what is to be said of it.
+fn told(values: &Value, mut path: Vec<Step>, problem: &Problem) -> (Vec<Step>, String) {
     if let Problem::UnknownKey { key, .. } = problem {
         // The path ends with the key itself where the table is that of a struct.
         let inside = table_at(values, &path).is_some_and(|t| t.contains_key(key));
@@ -256,7 +290,7 @@ fn explain(
         }
         Problem::Other(message) => format!("{of}: {}", plain_words(message)),
     };
-    format!("line {}: {message}", line(start(document, &path)))
+    (path, message)
 }
 
 fn kind(table: &toml::Table) -> Option<&str> {

@@ -267,11 +267,12 @@ impl Equations<'_> {
     pub fn center_of_mass(&self) -> Option<(f64, Vec3)> {
         let parameters = self.at.parameters;
         let of = |b: usize| (b, parameters.mass(b), parameters.center_of_mass(b));
-        self.center((0..self.at.system.len()).map(of))
+        let (mass, moment) = self.moment((0..self.at.system.len()).map(of));
+        (mass > 0.0).then(|| (mass, moment / mass))
     }
 
-    /// Volume of the bodies in the water and of what floats them, m³, and its centre, at which their buoyancy acts together, in the world, m; none where nothing is in
-    /// the water.
+    /// Volume of what bodies displace, below a `waterline`, and of what floats them, m³, and its centre, at which their buoyancy acts together, in the world, m; none where nothing is
+    /// in the water.
     pub fn center_of_buoyancy(&self) -> Option<(f64, Vec3)> {
         let (system, parameters) = (self.at.system, self.at.parameters);
         let wet = |b: &usize| system.bodies[*b].submerged.is_some();
@@ -279,16 +280,19 @@ impl Equations<'_> {
         let given = |b: &usize| system.bodies[*b].volume == 0.0 && parameters.volume(*b) > 0.0;
         let bodies = (0..system.len()).filter(|b| wet(b) || given(b));
         let own = bodies.map(|b| (b, parameters.volume(b), parameters.center_of_buoyancy(b)));
-        let floats = system.forces.iter().flat_map(|f| f.displaced(parameters));
-        self.center(own.chain(floats))
+        let (whole, own) = self.moment(own);
+        let (beside, moment) = self.at.displaced();
+        let volume = whole + beside;
+        // What is all out of the water leaves rounding.
+        (volume > 1e-12 * whole).then(|| (volume, (own + moment) / volume))
     }
 
-    fn center(&self, parts: impl Iterator<Item = (usize, f64, Vec3)>) -> Option<(f64, Vec3)> {
+    /// The sum of parts of bodies, given with the points of their frames at which they are, and its moment about the world's origin.
+    fn moment(&self, parts: impl Iterator<Item = (usize, f64, Vec3)>) -> (f64, Vec3) {
         let poses = self.poses();
-        let (size, moment) = parts.fold((0.0, Vec3::zeros()), |(size, moment), (b, own, at)| {
+        parts.fold((0.0, Vec3::zeros()), |(size, moment), (b, own, at)| {
             (size + own, moment + own * poses[b].apply(&at))
-        });
-        (size > 0.0).then(|| (size, moment / size))
+        })
     }
 
     /// Kinetic energy of bodies and water at `v`, J; the water's in the frame that moves with the current.

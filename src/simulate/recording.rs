@@ -5,7 +5,10 @@ use super::{Checkpoint, Rollout};
 use crate::Result;
 use crate::scene::Scene;
 
-/// What a recording holds unless told otherwise, in its order.
+/// The name of the controls that acted, of which the last row has none: there no step begins.
+pub(super) const CONTROLS: &str = "applied_controls";
+
+/// What a recording holds unless told otherwise, in its order, before the controls.
 const RECORDED: [&str; 6] = ["q", "v", "energy", "momentum", "min_gap", "gap_error"];
 
 /// What is written of a run: one row for the start and one after each step. SI units.
@@ -37,13 +40,27 @@ pub struct Recorded {
 }
 
 impl Recording {
-    /// Every state of a rollout of a scene: coordinates, velocities, energy, momentum, the smallest gap and the estimated error across it.
+    /// Every state of a rollout of a scene: coordinates, velocities, energy, momentum, the smallest gap and the estimated error across it, and the controls
+    /// that acted from there on ([`Rollout::applied_controls`]), of the last state NaN.
     ///
     /// # Errors
     /// A value that can't be found ([`Observable::value`]).
     pub fn of(scene: &Scene, rollout: &Rollout) -> Result<Self> {
         let of = |name: &&str| OBSERVABLES.iter().find(|o| o.name() == *name);
-        Self::with(scene, rollout, RECORDED.iter().filter_map(of).copied())
+        let mut out = Self::with(scene, rollout, RECORDED.iter().filter_map(of).copied())?;
+        let labels = rollout.simulator().control_names();
+        if !labels.is_empty() {
+            let acted = rollout.applied_controls();
+            let none = vec![f64::NAN; labels.len()];
+            let steps = acted.column_iter().map(|u| u.iter().copied().collect());
+            out.observables.push(Recorded {
+                name: CONTROLS,
+                labels,
+                scalar: false,
+                values: steps.chain([none]).collect(),
+            });
+        }
+        Ok(out)
     }
 
     /// The same with these observables.

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
 
+use super::recording::CONTROLS;
 use super::{Checkpoint, Recording};
 use crate::{Error, Result};
 
@@ -70,7 +71,11 @@ impl Serialize for Recording {
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("scene", &self.scene)?;
         map.serialize_entry("dt", &self.dt)?;
-        for (key, name) in [("coordinates", "q"), ("velocities", "v")] {
+        for (key, name) in [
+            ("coordinates", "q"),
+            ("velocities", "v"),
+            ("controls", CONTROLS),
+        ] {
             let Some(o) = self.observables.iter().find(|o| o.name == name) else {
                 continue;
             };

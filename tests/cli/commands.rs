@@ -320,7 +320,18 @@ fn run_summarises_and_writes_the_trajectory() {
         let csv = std::fs::read_to_string(Path::new(&out).join("trajectory.csv")).unwrap();
         let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
         assert_eq!(rows.len(), 8);
-        assert!(rows.iter().all(|r| r.len() == 1 + 4 + 4 + 1 + 6 + 1 + 2));
+        assert_eq!(trajectory["controls"][0], rows[0][19]);
+        let controls = trajectory["controls"].as_array().unwrap().len();
+        assert!(controls > 0 && rows.iter().all(|r| r.len() == 19 + controls));
+        // At the last state no step begins, and nothing acts.
+        let acted = trajectory["applied_controls"].as_array().unwrap();
+        for (r, acted) in rows[1..].iter().zip(acted) {
+            let cells = r[19..].iter().map(|x| x.parse::<f64>().ok());
+            let acted = acted.as_array().unwrap().iter().map(|x| x.as_f64());
+            assert!(cells.eq(acted));
+        }
+        let acts = |r: &Vec<&str>| r[19..].iter().all(|x| !x.is_empty());
+        assert!(rows[1..7].iter().all(acts) && !acts(&rows[7]));
         assert!(
             rows[1..]
                 .iter()
@@ -328,7 +339,7 @@ fn run_summarises_and_writes_the_trajectory() {
                 .all(|x| x.parse::<f64>().is_ok_and(f64::is_finite))
         );
         // Errors are estimated where bodies are coupled.
-        let estimated = |r: &Vec<&str>| r[17..].iter().all(|x| x.parse::<f64>().is_ok());
+        let estimated = |r: &Vec<&str>| r[17..19].iter().all(|x| x.parse::<f64>().is_ok());
         assert!(
             rows[1..]
                 .iter()

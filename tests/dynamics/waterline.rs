@@ -2,6 +2,7 @@
 
 use crate::support::bodies::sided_cylinder;
 use crate::support::{check_gradient, says};
+use hydrograd::adjoint::lie::Vec3;
 use hydrograd::dynamics::Integrator;
 use hydrograd::scene::{Body, Drag, DragPart, Fin, Fluid, Force, Joint, Scene, Shape};
 use hydrograd::simulate::gradcheck::{GradcheckSettings, gradcheck};
@@ -88,6 +89,35 @@ fn hydrostatic_stiffness_is_the_waterplanes() {
             assert!(error.abs() < 2e-6, "tilt {k}: {error:.1e}");
         }
     }
+}
+
+/// What is below the surface displaces, at the centre at which its buoyancy acts.
+#[test]
+fn the_center_of_buoyancy_is_that_of_what_is_below() {
+    let [a, b, c] = [0.6, 0.4, 0.2];
+    let sim = simulator(
+        &floating(Shape::cuboid([a, b, c])),
+        Fidelity::Isolated,
+        Integrator::Rk4,
+    );
+    let at = |xi: [f64; 6]| {
+        let q = sim.start().0;
+        let q = sim.integrate(q, &DVector::from_row_slice(&xi)).unwrap();
+        sim.equations(&q).unwrap().center_of_buoyancy()
+    };
+    let (volume, center) = at([0.0; 6]).unwrap();
+    assert!((volume / (0.5 * a * b * c) - 1.0).abs() < 1e-12);
+    assert!((center - Vec3::new(0.2, -0.1, HEIGHT - 0.25 * c)).norm() < 1e-12);
+    // Tilted, its moment about the body's origin, where the weight has none, is what turns the body; the frame has not turned about x.
+    let tilt = [0.0, 0.0, 0.03, 0.0, 0.2, 0.0];
+    let (volume, center) = at(tilt).unwrap();
+    let arm = center - Vec3::new(0.2, -0.1, HEIGHT + 0.03);
+    let turning = -DENSITY * GRAVITY * volume * arm.x;
+    let found = force(&sim, tilt)[4];
+    assert!((found / turning - 1.0).abs() < 1e-10, "{found} {turning}");
+    assert!(at([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]).is_none());
+    let (deep, _) = at([0.0, 0.0, -0.5, 0.3, 0.0, 0.0]).unwrap();
+    assert!((deep / (a * b * c) - 1.0).abs() < 1e-12);
 }
 
 /// Far below the surface it is as if there were none, and above there is no force but weight.

@@ -1,6 +1,7 @@
 //! Bad scene files: each gets an error that names the place and the remedy, and never a panic.
 
 use crate::support::{example_path, says};
+use hydrograd::scene::Force;
 use hydrograd::{Scene, Settings, Simulator};
 
 /// A scene file with one ball; `body` is added to the ball, `rest` after it.
@@ -406,4 +407,35 @@ fn meshes_are_named_by_file_line_body_and_key() {
     let scene = Scene::load(folder.path().join("scene.toml")).unwrap();
     let again = Scene::from_toml(&scene.to_toml().unwrap(), "").unwrap();
     assert_eq!(scene, again);
+}
+
+/// A force by itself is read as one in a scene is, and told alike.
+#[test]
+fn forces_by_themselves_are_told_by_their_keys() {
+    let spring = "{\"kind\": \"spring\", \"body\": \"ball\", \"stiffness\": 3, \"to\": null}";
+    let Force::Spring(spring) = Force::from_json(spring).unwrap() else {
+        panic!("no spring");
+    };
+    assert_eq!((spring.stiffness, spring.to), (3.0, None));
+    for (keys, words) in [
+        ("{", ["force", "EOF"]),
+        (
+            "{\"body\": \"ball\"}",
+            ["it lacks the key `kind`", "spring"],
+        ),
+        (
+            "{\"kind\": \"spring\", \"body\": \"ball\"}",
+            ["it lacks the key `stiffness`", "add"],
+        ),
+        (
+            "{\"kind\": \"damping\", \"body\": \"ball\", \"linear\": [1, 2]}",
+            ["linear: six numbers", "six rows"],
+        ),
+        (
+            "{\"kind\": \"thruster\", \"body\": \"ball\", \"direction\": [1, 0]}",
+            ["direction: invalid length 2", "a list of length 3"],
+        ),
+    ] {
+        says(Force::from_json(keys).unwrap_err().to_string(), &words);
+    }
 }

@@ -184,6 +184,22 @@ impl ForceModel for Floating {
         true
     }
 
+    fn displaced(&self, place: &Place) -> (f64, Vec3) {
+        let out_of_it = |hull: &Floater| {
+            let below = hull.displaced(&self.surface, place);
+            let (fill, whole) = (hull.fill(place.parameters), place.parameters[hull.volume]);
+            let center = place.poses[hull.body].apply(&place.parameters.point(hull.center));
+            (
+                fill * below.volume - whole,
+                fill * below.moment - whole * center,
+            )
+        };
+        let each = self.hulls.iter().map(out_of_it);
+        each.fold((0.0, Vec3::zeros()), |(all, moment), (volume, of)| {
+            (all + volume, moment + of)
+        })
+    }
+
     fn potential_energy(&self, place: &Place) -> f64 {
         let of = |hull: &Floater| {
             let below = hull.displaced(&self.surface, place);

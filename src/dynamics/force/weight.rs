@@ -147,15 +147,16 @@ impl ForceModel for Weight {
         true
     }
 
-    fn displaced(&self, parameters: &Parameters) -> Vec<(usize, f64, Vec3)> {
-        let floats = self
-            .parcels
-            .iter()
-            .filter_map(|p| match (&p.point, p.volume) {
-                (Point::Fixed(at), Some(volume)) => Some((p.body, parameters[volume], *at)),
-                _ => None,
-            });
-        floats.collect()
+    fn displaced(&self, place: &Place) -> (f64, Vec3) {
+        let floats = self.parcels.iter().filter_map(|p| {
+            let (Point::Fixed(at), Some(volume)) = (&p.point, p.volume) else {
+                return None;
+            };
+            Some((place.parameters[volume], place.poses[p.body].apply(at)))
+        });
+        floats.fold((0.0, Vec3::zeros()), |(all, moment), (volume, at)| {
+            (all + volume, moment + volume * at)
+        })
     }
 
     fn potential_energy(&self, place: &Place) -> f64 {

@@ -274,13 +274,9 @@ impl Equations<'_> {
     /// Volume of what bodies displace, below a `waterline`, and of what floats them, m³, and its centre, at which their buoyancy acts together, in the world, m; none where nothing is
     /// in the water.
     pub fn center_of_buoyancy(&self) -> Option<(f64, Vec3)> {
-        let (system, parameters) = (self.at.system, self.at.parameters);
-        let wet = |b: &usize| system.bodies[*b].submerged.is_some();
-        // What has a volume and no surface.
-        let given = |b: &usize| system.bodies[*b].volume == 0.0 && parameters.volume(*b) > 0.0;
-        let bodies = (0..system.len()).filter(|b| wet(b) || given(b));
-        let own = bodies.map(|b| (b, parameters.volume(b), parameters.center_of_buoyancy(b)));
-        let (whole, own) = self.moment(own);
+        let parameters = self.at.parameters;
+        let of = |b: usize| (b, parameters.volume(b), parameters.center_of_buoyancy(b));
+        let (whole, own) = self.moment((0..self.at.system.len()).map(of));
         let (beside, moment) = self.at.displaced();
         let volume = whole + beside;
         // What is all out of the water leaves rounding.

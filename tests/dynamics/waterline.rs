@@ -118,6 +118,16 @@ fn the_center_of_buoyancy_is_that_of_what_is_below() {
     assert!(at([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]).is_none());
     let (deep, _) = at([0.0, 0.0, -0.5, 0.3, 0.0, 0.0]).unwrap();
     assert!((deep / (a * b * c) - 1.0).abs() < 1e-12);
+    // What can't move is buoyant as well.
+    let mut scene = floating(Shape::cuboid([a, b, c]));
+    let anchor = Body::new(Shape::cuboid([a, b, c])).density(DENSITY);
+    scene.add(anchor.joint(Joint::Fixed).at([0.2, -0.1, HEIGHT - 2.0]));
+    let sim = simulator(&scene, Fidelity::Isolated, Integrator::Rk4);
+    let both = sim.equations(sim.start().0).unwrap().center_of_buoyancy();
+    let (volume, center) = both.unwrap();
+    assert!((volume / (1.5 * a * b * c) - 1.0).abs() < 1e-12);
+    let height = HEIGHT - (0.5 * 0.25 * c + 2.0) / 1.5;
+    assert!((center.z - height).abs() < 1e-12, "{center}");
 }
 
 /// Far below the surface it is as if there were none, and above there is no force but weight.

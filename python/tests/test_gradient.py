@@ -240,7 +240,7 @@ def test_springs_and_screws():
         assert found[name] == pytest.approx(slope, rel=1e-6), name
     assert hg.Scene.from_toml(scene.to_toml()) == scene
     for keys, says in (
-        ({"stiffness": 1.0, "lenght": 2.0}, r"has no key `lenght`; did you mean `length`\?"),
+        ({"stiffness": 1.0, "lenght": 2.0}, "has no key `lenght`; remove it or use one of the keys: name, body"),
         ({"stiffness": "firm"}, 'stiffness: invalid type: string "firm", expected a number'),
         ({}, "lacks the key `stiffness`"),
         ({"stiffness": 1.0, "at": [0.0, 1.0]}, "at: invalid length 2, expected a list of length 3"),

@@ -1,4 +1,4 @@
-//! Simulators: the class; its methods stand in `simulation.rs`.
+//! Simulators: the class; its methods stand in `simulation`.
 
 use crate::interrupt::short;
 use pyo3::prelude::*;

@@ -331,7 +331,7 @@ impl<'a> Evaluation<'a> {
             .system
             .forces
             .iter()
-            .map(|f| f.displaced(&self.place()));
+            .flat_map(|f| f.displaced(&self.place()));
         each.fold((0.0, Vec3::zeros()), |(all, moment), (volume, of)| {
             (all + volume, moment + of)
         })

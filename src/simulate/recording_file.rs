@@ -165,7 +165,7 @@ impl Earlier {
         let (time, observed) = all.map_err(|name: &str| {
             not_understood(
                 &self.path,
-                format!("rows of `{name}` are missing or of another length"),
+                format!("rows of `{name}` are missing or of another length; give a trajectory.json of this scene, written by this version"),
             )
         })?;
         let before = time.len().saturating_sub(1);

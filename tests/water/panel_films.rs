@@ -271,7 +271,7 @@ fn what_is_refused_is_named() {
 }
 
 /// Two like discs, radius 1 and a tenth as thick, face to face with a gap of 0.005, shifted and turned against each other: their faces don't meet. M along the gap against 5120 faces; it was
-/// up to 13 % off by 1280 and had no solution by 320 in half of the poses while both were held apart as little as faces that meet.
+/// up to 15 % off by 1280 and had no solution by 320 in two of the poses while both were held apart as little as faces that meet.
 #[test]
 fn faces_that_do_not_meet() {
     // Radians, radii, converged M.

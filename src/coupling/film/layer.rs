@@ -352,11 +352,16 @@ fn bounded<D: Jet>(square: D) -> [D; 2] {
     if t.re() >= 1.0 {
         return [D::from(STEEPEST), D::from(0.0)];
     }
-    let cube = t * t * t;
+    let fourth = t * t * t * t;
     [
-        (t - cube * t * (t * (t - 3.0) + 2.5)) * WIDTH + 1.0,
-        -(cube * (t * (t * 6.0 - 15.0) + 10.0)) + 1.0,
+        (t - fourth * (t * (t - 3.0) + 2.5)) * WIDTH + 1.0,
+        -rise(t) + 1.0,
     ]
+}
+
+/// From 0 at t = 0 to 1 at 1, where two derivatives vanish.
+fn rise<D: Jet>(t: D) -> D {
+    t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
 }
 
 /// An arc's length in its height, and its derivative, of a square of a sine.
@@ -384,9 +389,8 @@ fn share<D: Jet>(square: D, goes_on: f64) -> [D; 2] {
         return [D::from(goes_on), D::from(0.0)];
     }
     let left = -t + 1.0;
-    let value = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
     let slope = t * t * left * left * (30.0 / (1.0 - BESIDE));
-    [value * -lost + 1.0, slope * -lost]
+    [rise(t) * -lost + 1.0, slope * -lost]
 }
 
 impl<D: Jet> Facing<D> {

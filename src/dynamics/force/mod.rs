@@ -412,9 +412,9 @@ pub trait ForceModel: Send + Sync {
         Vec::new()
     }
 
-    /// What it displaces beside the volumes of the bodies, less what of these is out of the water: the volume, m³, and its moment about the world's origin, m⁴.
-    fn displaced(&self, _place: &Place) -> (f64, Vec3) {
-        (0.0, Vec3::zeros())
+    /// What it displaces beside the volumes of the bodies, less what of these is out of the water: volumes, m³, and their moments about the world's origin, m⁴.
+    fn displaced(&self, _place: &Place) -> Vec<(f64, Vec3)> {
+        Vec::new()
     }
 
     /// Refuses parameters that no single one's range does.

@@ -184,7 +184,7 @@ impl ForceModel for Floating {
         true
     }
 
-    fn displaced(&self, place: &Place) -> (f64, Vec3) {
+    fn displaced(&self, place: &Place) -> Vec<(f64, Vec3)> {
         let out_of_it = |hull: &Floater| {
             let below = hull.displaced(&self.surface, place);
             let (fill, whole) = (hull.fill(place.parameters), place.parameters[hull.volume]);
@@ -194,10 +194,7 @@ impl ForceModel for Floating {
                 fill * below.moment - whole * center,
             )
         };
-        let each = self.hulls.iter().map(out_of_it);
-        each.fold((0.0, Vec3::zeros()), |(all, moment), (volume, of)| {
-            (all + volume, moment + of)
-        })
+        self.hulls.iter().map(out_of_it).collect()
     }
 
     fn potential_energy(&self, place: &Place) -> f64 {

@@ -147,16 +147,15 @@ impl ForceModel for Weight {
         true
     }
 
-    fn displaced(&self, place: &Place) -> (f64, Vec3) {
+    fn displaced(&self, place: &Place) -> Vec<(f64, Vec3)> {
         let floats = self.parcels.iter().filter_map(|p| {
             let (Point::Fixed(at), Some(volume)) = (&p.point, p.volume) else {
                 return None;
             };
-            Some((place.parameters[volume], place.poses[p.body].apply(at)))
+            let volume = place.parameters[volume];
+            Some((volume, volume * place.poses[p.body].apply(at)))
         });
-        floats.fold((0.0, Vec3::zeros()), |(all, moment), (volume, at)| {
-            (all + volume, moment + volume * at)
-        })
+        floats.collect()
     }
 
     fn potential_energy(&self, place: &Place) -> f64 {

@@ -842,7 +842,7 @@ class Loads:
     the wrench across its own joint and the opposite ones of what it carries, they are the rate of a body's own momentum."""
     @property
     def kinds(self) -> list[str]:
-        """What acts: the scene's forces as they are called ("gravity", "buoyancy", "linear drag", …), "water" (added mass; with "isolated" none on bodies that can't move), "contact"."""
+        """What acts: the scene's forces by what they are ("gravity", "buoyancy", "linear drag", "spring", …; all springs together, whatever the scene names them), "water" (added mass; with "isolated" none on bodies that can't move), "contact"."""
     def wrenches(self, kind: str) -> _Array:
         """What one kind does to each body (bodies, 6)."""
     @property

@@ -21,7 +21,7 @@ fn rows<'py>(py: Python<'py>, wrenches: &[Vec6]) -> Numbers<'py> {
 
 #[pymethods]
 impl Loads {
-    /// What acts: the scene's forces as they are called ("gravity", "buoyancy", "linear drag", …), "water" (added mass; with "isolated" none on bodies that can't move), "contact".
+    /// What acts: the scene's forces by what they are ("gravity", "buoyancy", "linear drag", "spring", …; all springs together, whatever the scene names them), "water" (added mass; with "isolated" none on bodies that can't move), "contact".
     #[getter]
     fn kinds(&self) -> Vec<String> {
         self.0.kinds().map(String::from).collect()

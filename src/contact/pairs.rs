@@ -288,6 +288,25 @@ impl Contacts {
         most * (1.0 + 1e-9)
     }
 
+    /// How fast the surfaces of a pair change for one another by turning, rad/s: not by turns of round ones about an axis of theirs.
+    pub fn turning(&self, pair: &ContactPair, poses: &[Pose], twists: &[Vec6]) -> f64 {
+        let own = |b: usize, shape: &ContactShape| turning(shape, &poses[b], &twists[b]);
+        let Some((first, second)) = self.solids(pair) else {
+            return 0.0;
+        };
+        let other = match second {
+            Partner::Wall(_) => 0.0,
+            Partner::Body(b, second) => own(b, second),
+        };
+        own(pair.first, first).max(other)
+    }
+
+    /// The same of [`Contacts::turning`], rad/s, of a body at `pose` with this spatial twist.
+    pub fn share_turning(&self, b: usize, pose: &Pose, twist: &Vec6) -> f64 {
+        let turns = self.shapes[b].iter().map(|s| turning(s, pose, twist));
+        turns.fold(0.0, f64::max)
+    }
+
     /// The shapes of a pair.
     fn solids(&self, pair: &ContactPair) -> Option<(&ContactShape, Partner<'_>)> {
         let [i, j] = pair.pieces;
@@ -314,6 +333,27 @@ fn half_thickness(shape: &ContactShape) -> (bool, f64) {
         Form::Core(core) if core.faces.is_empty() => (true, core.radius),
         Form::Core(core) => (false, 0.5 * core.thickness),
         Form::Cylinder(cylinder) => (false, cylinder.radius.min(cylinder.half)),
+    }
+}
+
+/// How fast it turns about axes about which it isn't round, rad/s, with this spatial twist.
+fn turning(shape: &ContactShape, pose: &Pose, twist: &Vec6) -> f64 {
+    let turn = pose.compose(&shape.solid.offset).rotation.transpose() * angular(twist);
+    let [x, y, z] = [turn.x, turn.y, turn.z].map(f64::abs);
+    match &shape.solid.form {
+        Form::Ellipsoid(ellipsoid) => {
+            let [a, b, c] = ellipsoid.semi_axes.into();
+            let about = |turn: f64, a: f64, b: f64| if a == b { 0.0 } else { turn };
+            about(x, b, c).max(about(y, c, a)).max(about(z, a, b))
+        }
+        Form::Core(core) => match core.corners.len() {
+            1 => 0.0,
+            2 => turn
+                .cross(&(core.corners[1] - core.corners[0]).normalize())
+                .norm(),
+            _ => turn.norm(),
+        },
+        Form::Cylinder(_) => x.hypot(y),
     }
 }
 

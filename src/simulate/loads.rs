@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 /// Wrenches on all bodies at one state, kind by kind, and across their joints: forces (N) and moments about each body's origin (N m), world axes.
 ///
-/// Kinds are the scene's forces by what they are called ("gravity", "buoyancy", "linear drag", "thrust", "fin", …), "water" (what the inertia of the water does: added mass), and
+/// Kinds are the scene's forces by what they are ("gravity", "buoyancy", "linear drag", "spring", "thrust", "fin", …; all springs together, whatever the scene names them), "water" (what the inertia of the water does: added mass), and
 /// of a step "contact" and the dampers solved with it. With the fidelity `isolated` the water's inertia does nothing to bodies that can't move. With the wrench across its own joint and the opposite ones across the joints of what it carries, they are the rate of a body's own momentum.
 #[derive(Clone, Debug)]
 pub struct Loads {

@@ -5,6 +5,7 @@ use super::observable::{Reading, differentiable, observable, velocity};
 use super::trajectory::Seed;
 use super::{Cotangents, GapReport, Gradient, Sample, Simulator};
 use crate::adjoint::step::{self, Tape};
+use crate::contact::ContactPair;
 use crate::dynamics::force::coarser;
 use crate::dynamics::{ContactForce, State, StateBar, StepRecord};
 use crate::error::readable;
@@ -216,16 +217,15 @@ impl Rollout {
             .filter(|r| !r.passed().is_empty());
         let first = passing.next()?;
         let name = |b: usize| format!("body {:?}", system.bodies[b].name);
-        let pair = first.passed().pairs.first();
-        let limit = first
-            .passed()
-            .limits
-            .first()
-            .and_then(|k| system.limits.get(*k));
-        let what = match (pair, limit) {
-            (Some(pair), _) => {
-                let other = pair.second_body().map_or("a wall".into(), name);
-                format!("{} goes deep into {other}", name(pair.first))
+        let passed = first.passed();
+        let limit = (passed.limits.first()).and_then(|k| system.limits.get(*k));
+        let other = |pair: &ContactPair| pair.second_body().map_or("a wall".into(), name);
+        let pair = (passed.pairs.first()).map(|p| (p, "goes deep into"));
+        let turned =
+            (passed.turned.first()).map(|p| (p, "turns by more than 0.3 rad a piece against"));
+        let what = match (pair.or(turned), limit) {
+            (Some((pair, does)), _) => {
+                format!("{} {does} {}", name(pair.first), other(pair))
             }
             (None, Some(limit)) => {
                 let links = system.tree.links();

@@ -11,6 +11,7 @@ use crate::adjoint::rigid::inertia_matrix;
 use crate::dynamics::force::ForceModel;
 use crate::dynamics::{Drive, Integrator, System};
 use crate::error::readable;
+use crate::multibody::Link;
 use nalgebra::DVector;
 
 /// Share of the largest kinetic energy that may come from nowhere before a run warns. Every integrator but the paper's
@@ -137,9 +138,9 @@ impl Rollout {
                     .into()
             }
             false => format!(
-                "the time step of {} s is too long for these velocities, this drag or these springs; take a smaller one{}",
+                "the time step of {} s is too long for these velocities, this drag or these springs; {}",
                 self.simulator.time_step(),
-                self.finer_integrator()
+                self.finer()
             ),
         };
         Some(format!(
@@ -150,12 +151,37 @@ impl Rollout {
         ))
     }
 
-    /// What else may be taken than a shorter step, as a message ends.
-    pub(super) fn finer_integrator(&self) -> &'static str {
-        match self.simulator.choices.integrator {
-            Integrator::Midpoint => "",
-            _ => ", or the integrator midpoint",
+    /// What may be taken instead of a step that is too long, as a message ends.
+    pub(super) fn finer(&self) -> String {
+        const RESOLVED: f64 = 1.0;
+        let (turn, body) = self.largest_turn();
+        if turn > RESOLVED {
+            let name = &self.simulator.system().bodies[body].name;
+            return format!(
+                "take a smaller one: body {name:?} turns by up to {} rad in a step, and no integrator resolves more than about one",
+                readable((turn * 10.0).round() / 10.0)
+            );
         }
+        match self.simulator.choices.integrator {
+            Integrator::Midpoint => "take a smaller one".into(),
+            _ => "take a smaller one, or the integrator midpoint".into(),
+        }
+    }
+
+    /// The largest angle by which a body turns in a step, rad, of those that may do so about any axis, and which.
+    fn largest_turn(&self) -> (f64, usize) {
+        let tree = &self.simulator.system().tree;
+        // Those whose coordinates hold a quaternion.
+        let about_any = |l: &Link| l.q.len() > l.v.len();
+        let free: Vec<usize> = (0..tree.links().len())
+            .filter(|b| about_any(&tree.links()[*b]))
+            .collect();
+        let turns = self.samples().iter().flat_map(|s| {
+            let twists = tree.twists(&tree.kinematics(&s.q), &s.v);
+            let of = |b: &usize| (angular(&twists[*b]).norm() * self.simulator.time_step(), *b);
+            free.iter().map(of).collect::<Vec<_>>()
+        });
+        turns.fold((0.0, 0), |a, x| if x.0 > a.0 { x } else { a })
     }
 
     /// The most that controls can have done by each state, J.

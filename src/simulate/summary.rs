@@ -163,11 +163,11 @@ impl Rollout {
         (lost > GAIN * kinetic.max(f64::MIN_POSITIVE)).then(|| {
             format!(
                 "the energy falls by {lost:.3e} J, {:.1} % of the largest kinetic energy, by t = {} s, though nothing takes it: the time \
-                 step of {} s is too long for these velocities; take a smaller one{}",
+                 step of {} s is too long for these velocities; {}",
                 100.0 * lost / kinetic,
                 readable(least.time),
                 readable(self.simulator.time_step()),
-                self.finer_integrator()
+                self.finer()
             )
         })
     }

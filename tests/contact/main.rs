@@ -15,6 +15,8 @@ mod pieces;
 mod pressed;
 mod resistance;
 mod standard;
+mod thin;
+
 mod tools;
 mod wet;
 

@@ -276,6 +276,28 @@ fn the_finer_print_is_read() {
     assert!(off.norm() < 1e-15);
 }
 
+/// Only what is right in the world may float.
+#[test]
+fn a_body_within_another_may_not_be_free() {
+    let within = |free: &str| {
+        format!(
+            r#"<mujoco><worldbody><body name="a"><freejoint/><geom size="0.1"/>
+            <frame pos="0 0 1"><body name="b">{free}<geom size="0.1"/></body></frame></body></worldbody></mujoco>"#
+        )
+    };
+    for free in ["<freejoint/>", r#"<joint type="free"/>"#] {
+        let (_folder, path) = folder(|_| within(free));
+        let error = Scene::from_urdf(&path, &Robot::default()).unwrap_err();
+        says(
+            error,
+            &["body \"b\"", "free within another body", "worldbody"],
+        );
+    }
+    let (_folder, path) =
+        folder(|_| within("<joint/>").replace("<freejoint/>", r#"<joint type="free"/>"#));
+    assert!(Scene::from_urdf(&path, &Robot::default()).is_ok());
+}
+
 /// A hip of three hinges is three joints; two of them about one axis are refused, as nothing tells them apart.
 #[test]
 fn a_body_may_have_three_hinges() {

@@ -313,6 +313,18 @@ fn lengths_that_differ_by_rounding_are_the_same() {
             }
         }
     }
+    // Sides that are nearly alike have the same cells: differences by sizes don't see another mesh.
+    for (near, right) in [
+        ([0.2, 0.16, 0.2000002], [0.2, 0.16, 0.2]),
+        ([0.2, 0.2, 0.203], [0.2; 3]),
+        ([0.197, 0.2, 0.203], [0.2; 3]),
+    ] {
+        for faces in [80, 320, 1280] {
+            let [near, right] =
+                [near, right].map(|size| support::mesh(&Shape::cuboid(size), faces));
+            assert_eq!(near.faces(), right.faces());
+        }
+    }
 }
 
 #[test]

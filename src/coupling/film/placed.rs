@@ -267,6 +267,19 @@ impl PlacedFilm {
         columns.map(|(c, number)| (*c, all[*number])).collect()
     }
 
+    /// Faces that it has.
+    pub fn faces(&self) -> usize {
+        self.layer.cells.len()
+    }
+
+    /// Those to be gone through for the wrenches of columns of the basis: none where these are known.
+    pub fn faces_left(&self) -> usize {
+        match self.wrenches.get() {
+            Some(_) if self.solved.len() <= FEW => 0,
+            _ => self.faces(),
+        }
+    }
+
     /// How much of each potential there is in a combination of the basis.
     fn parts(&self, x: &DVector<f64>) -> Vec<f64> {
         let mut out = vec![0.0; self.solved.len()];

@@ -17,6 +17,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Films that were made stay up to so many times those that are near, and a few.
 const KEPT: usize = 4;
 const FEW: usize = 256;
+/// Faces in films from which on it pays to wake other threads: what is asked takes about a microsecond of each.
+const WORTH_WAKING: usize = 400;
+
+/// What each film gives, in order.
+fn over<'f, F: Sync, T: Send>(
+    films: &'f [F],
+    faces: impl Fn(&F) -> usize,
+    of: impl Fn(&'f F) -> T + Sync + Send,
+) -> Vec<T> {
+    match films.iter().map(faces).sum::<usize>() < WORTH_WAKING {
+        true => films.iter().map(of).collect(),
+        false => films.par_iter().map(of).collect(),
+    }
+}
 
 /// All films that there may be: those of gaps that were narrow once are kept, others made when their gaps are.
 #[derive(Clone, Default)]
@@ -368,8 +382,13 @@ impl PlacedFilms {
         self.all.get(apart.film)
     }
 
-    fn each<T: Send>(&self, of: impl Fn(&PlacedFilm) -> T + Sync) -> Vec<(&PlacedFilm, T)> {
-        self.all.par_iter().map(|film| (film, of(film))).collect()
+    /// What each gives, where so many of its `faces` are to be gone through.
+    fn each<'f, T: Send>(
+        &'f self,
+        faces: impl Fn(&PlacedFilm) -> usize,
+        of: impl Fn(&'f PlacedFilm) -> T + Sync + Send,
+    ) -> impl Iterator<Item = (&'f PlacedFilm, T)> {
+        self.all.iter().zip(over(&self.all, faces, of))
     }
 
     /// Adds the impulses of the twists in the columns, body frames.
@@ -380,7 +399,7 @@ impl PlacedFilms {
 
     /// Adds ∇E(x, y) of body-frame twists: spatial wrenches on the bodies.
     pub fn add_wrenches(&self, x: &DVector<f64>, y: &DVector<f64>, out: &mut [Vec6]) {
-        for (film, wrench) in self.each(|film| film.wrench(x, y)) {
+        for (film, wrench) in self.each(PlacedFilm::faces, |film| film.wrench(x, y)) {
             film.apply(&wrench, out);
         }
     }
@@ -392,14 +411,16 @@ impl PlacedFilms {
         pair: [&DVector<f64>; 2],
         out: &mut [Vec6],
     ) {
-        for (film, wrench) in self.each(|film| film.basis_wrench(basis, pair)) {
+        for (film, wrench) in self.each(PlacedFilm::faces_left, |film| {
+            film.basis_wrench(basis, pair)
+        }) {
             film.apply(&wrench, out);
         }
     }
 
     /// The same of a combination of the basis with every column.
     pub fn add_column_wrenches(&self, x: &DVector<f64>, out: &mut [Vec<Vec6>]) {
-        for (film, wrenches) in self.each(|film| film.column_wrenches(x)) {
+        for (film, wrenches) in self.each(PlacedFilm::faces_left, |film| film.column_wrenches(x)) {
             for (column, wrench) in &wrenches {
                 film.apply(wrench, &mut out[*column]);
             }
@@ -408,7 +429,7 @@ impl PlacedFilms {
 
     /// The films along spatial displacements of the bodies.
     pub fn along(&self, z: &[Vec6]) -> MovingFilms<'_> {
-        MovingFilms(self.all.par_iter().map(|film| film.along(z)).collect())
+        MovingFilms(over(&self.all, PlacedFilm::faces, |film| film.along(z)))
     }
 }
 
@@ -421,9 +442,13 @@ impl<'a> MovingFilms<'a> {
         self.0[apart.film].as_ref()
     }
 
-    fn each<T: Send>(&self, of: impl Fn(&MovingFilm<'a>) -> T + Sync) -> Vec<(&MovingFilm<'a>, T)> {
+    fn each<'f, T: Send>(
+        &'f self,
+        of: impl Fn(&'f MovingFilm<'a>) -> T + Sync + Send,
+    ) -> Vec<(&'f MovingFilm<'a>, T)> {
         let films: Vec<_> = self.0.iter().flatten().collect();
-        films.into_par_iter().map(|film| (film, of(film))).collect()
+        let found = over(&films, |film| film.placed.faces(), |film| of(film));
+        films.into_iter().zip(found).collect()
     }
 
     /// The water in all films, for body-frame twists (6·bodies), and as these gain `rates` where that is given.

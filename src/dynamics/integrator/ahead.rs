@@ -9,8 +9,11 @@
 
 use super::Stepper;
 use super::plan::{Plan, SEEN, Stops};
+use super::stages::ContactVelocities;
+use super::start::Start;
 use crate::Result;
-use crate::adjoint::lie::{Pose, Vec6, point_velocity};
+use crate::adjoint::contact::contact_force;
+use crate::adjoint::lie::{Pose, Vec3, Vec6, point_velocity};
 use crate::contact::ContactPair;
 use crate::dynamics::{ContactModel, Evaluation, PairContact, System};
 use crate::multibody::Kinematics;
@@ -24,8 +27,12 @@ const ROOM: f64 = 1.25;
 const MET: f64 = 0.05;
 /// Part of half the thickness that a piece may go past where surfaces meet.
 const DEEP: f64 = 0.5;
+/// The same of what is nearly that deep already, by all pieces of a step.
+const DEEPER: f64 = 0.1;
 /// Part of the gap at which surfaces touch that a piece leaves, where there is water.
 const LEFT: f64 = 0.1;
+/// The angle by which a piece may turn what touches, rad: laws of contact know surfaces that go straight on.
+const TURN: f64 = 0.3;
 /// Part of a joint's range that a piece may come nearer to its end by.
 const SHARE: f64 = 0.25;
 /// Part of the range that it may end past it.
@@ -134,6 +141,35 @@ fn closed(way: &Way, model: &ContactModel, k: &ContactPair, t: f64) -> bool {
         && (under(end, 0.0) || !under(&way.start.get_or_init(|| way.at(0.0)).0, least))
 }
 
+/// Whether a pair presses, of `points` that are seen, in bodies with these twists.
+fn presses(points: &[PairContact], k: &ContactPair, twists: &[Vec6]) -> bool {
+    let mut own = points.iter().filter(|c| c.pair == *k);
+    own.any(|c| contact_force(&c.law, &c.point_state(twists)).force != Vec3::zeros())
+}
+
+/// Whether a pair gets too deep within the time `dt` of one of so many pieces: halfway, or where it nearly is already and is pressed there, by all pieces together, little
+/// deeper.
+fn deep(way: &Way, model: &ContactModel, k: &ContactPair, dt: f64, pieces: usize) -> bool {
+    let shapes = &model.shapes;
+    let (poses, twists) = way.start.get_or_init(|| way.at(0.0));
+    let halfway = shapes.halfway(k);
+    let (most, share) = (DEEP * halfway, DEEPER * halfway / pieces as f64);
+    let closing = shapes.closing(k, poses, twists) * dt;
+    if closing <= share {
+        return false;
+    }
+    let points = shapes.points_within(k, poses, share - most);
+    let full = points.iter().flatten().filter(|p| p.weight >= FULL);
+    let in_already = full.map(|p| p.gap).fold(0.0, f64::min);
+    let end = match in_already < 0.0 {
+        true => in_already - share - MET * halfway,
+        false if closing <= most => return false,
+        false => -most,
+    };
+    // Where no distance is found bodies are deep in one another.
+    !matches!(way.meeting(model, k, dt, end), Ok(None))
+}
+
 fn relative(pair: &ContactPair, twists: &[Vec6]) -> Vec6 {
     let second = pair.second_body();
     twists[pair.first] - second.map_or(Vec6::zeros(), |b| twists[b])
@@ -173,6 +209,14 @@ impl Stepper<'_> {
                 plan.pieces = plan.pieces.max(wanted);
                 if wanted > 1 && model.rigid {
                     plan.sharp.pairs.push(*k);
+                }
+            }
+            // A blow on a thin body's side may have it spin so fast that its own motion isn't resolved, which gives and takes energy.
+            for (b, link) in system.tree.links().iter().enumerate() {
+                if link.q.len() > link.v.len() {
+                    let pose = &e.kinematics.poses[b];
+                    let turn = model.shapes.share_turning(b, pose, &twists[b]) * dt;
+                    plan.pieces = plan.pieces.max(pieces(turn));
                 }
             }
         }
@@ -252,18 +296,21 @@ impl Stepper<'_> {
         Ok(Some(out))
     }
 
-    /// What is passed by a step from `e` that moves by `v`: surfaces that get so deep that they might come out on the other side, or so near that there is no
-    /// water left between them, and joints that get past their limit by a part of their range. Where the stiffness was given, what presses sinks in as it was asked for; what
-    /// comes by unseen is met.
-    pub(super) fn passed(&self, e: &Evaluation, v: &DVector<f64>) -> Stops {
+    /// What is passed by the step that starts so and moves by `velocities`: surfaces that get so deep that they might come out on the other side, or so near that there
+    /// is no water left between them, what presses and turns too far, and joints that get past their limit by a part of their range. Where the stiffness was given, what
+    /// presses sinks in as it was asked for; what comes by unseen is met.
+    pub(super) fn passed(&self, start: &Start, velocities: &ContactVelocities) -> Stops {
         let mut out = Stops::default();
         let (system, dt) = (self.system, self.dt);
+        let (e, v) = (start.e, &velocities.after);
         if let Some(model) = &system.contact {
             let pressed = |k: &ContactPair| e.contact_points.iter().any(|c| c.pair == *k);
             let wet = model.rigid && model.wet;
             let way = Way::new(system, &e.q, v);
+            let poses = &e.kinematics.poses;
             let twists = system.tree.twists(&e.kinematics, v);
-            let mut near = met_within(model, &e.kinematics.poses, &twists, dt);
+            let acting = system.tree.twists(&e.kinematics, velocities.acting());
+            let mut near = met_within(model, poses, &twists, dt);
             if wet {
                 let end = &way.end.get_or_init(|| way.at(dt)).0;
                 near.extend(model.near(end, |_| 0.0));
@@ -271,26 +318,16 @@ impl Stepper<'_> {
                 near.dedup();
             }
             for k in &near {
-                let shapes = &model.shapes;
+                if model.shapes.turning(k, poses, &twists) * dt > TURN
+                    && presses(&start.near.contact_points, k, &acting)
+                {
+                    out.turned.push(*k);
+                }
                 if !model.rigid && pressed(k) {
                     continue;
                 }
-                if wet && closed(&way, model, k, dt) {
-                    out.pairs.push(*k);
-                    continue;
-                }
-                let deep = DEEP * shapes.halfway(k);
-                if shapes.closing(k, &e.kinematics.poses, &twists) * dt <= deep {
-                    continue;
-                }
-                // What is in already is pressed there, and didn't come that deep in this step.
-                let poses = &e.kinematics.poses;
-                let pressed = shapes.points_within(k, poses, -0.5 * deep);
-                if pressed.is_ok_and(|points| points.iter().any(|p| p.weight >= FULL)) {
-                    continue;
-                }
-                // Where no distance is found bodies are deep in one another.
-                if !matches!(way.meeting(model, k, dt, -deep), Ok(None)) {
+                let dry = wet && closed(&way, model, k, dt);
+                if dry || deep(&way, model, k, dt, start.plan.pieces) {
                     out.pairs.push(*k);
                 }
             }

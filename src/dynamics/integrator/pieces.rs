@@ -59,7 +59,11 @@ impl<'a> Stepper<'a> {
 
     /// What of it presses more stiffly in more pieces: a stiffness that was given stays what it is.
     fn rigid(&self, passed: &Stops) -> Stops {
-        let mut out = passed.clone();
+        let mut out = Stops::default();
+        out.add(passed);
+        out.pairs.append(&mut out.turned);
+        out.pairs.sort_unstable();
+        out.pairs.dedup();
         if self.system.contact.as_ref().is_some_and(|m| !m.rigid) {
             out.pairs.clear();
         }
@@ -163,7 +167,7 @@ impl<'a> Stepper<'a> {
         };
         let passed = match &stages {
             Stages::Contact(velocities) | Stages::Touching(velocities) => {
-                self.passed(e, &velocities.after)
+                self.passed(&start, velocities)
             }
             Stages::RungeKutta(_) => Stops::default(),
         };

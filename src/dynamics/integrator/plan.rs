@@ -13,6 +13,8 @@ pub(super) const SEEN: usize = 64;
 pub struct Stops {
     /// Of [`Contacts::pairs`](crate::contact::Contacts::pairs), ascending.
     pub pairs: Vec<ContactPair>,
+    /// Those that touch while one of the two turns too far.
+    pub turned: Vec<ContactPair>,
     /// Of [`System::limits`](crate::dynamics::System::limits), ascending.
     pub limits: Vec<usize>,
 }
@@ -20,12 +22,13 @@ pub struct Stops {
 impl Stops {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.pairs.is_empty() && self.limits.is_empty()
+        self.pairs.is_empty() && self.turned.is_empty() && self.limits.is_empty()
     }
 
     /// Adds others.
     pub(super) fn add(&mut self, other: &Self) {
         add(&mut self.pairs, &other.pairs);
+        add(&mut self.turned, &other.turned);
         add(&mut self.limits, &other.limits);
     }
 }

@@ -54,7 +54,7 @@ impl<'p> LeftOut<'p> {
                 "compiler" => self.attributes(section, "compiler", "the file")?,
                 "default" => self.class(section, "main")?,
                 "asset" => self.assets(section)?,
-                "worldbody" => self.body(section, "the world")?,
+                "worldbody" => self.body(section, "the world", 0)?,
                 "equality" => self.equalities(section)?,
                 "actuator" => self.actuators(section)?,
                 "option" | "size" | "statistic" | "visual" => {
@@ -167,8 +167,8 @@ impl<'p> LeftOut<'p> {
         Ok(())
     }
 
-    /// What is in a body, in a frame of it, or in the world; `of` is the body.
-    fn body(&mut self, from: &Element, of: &str) -> Result<()> {
+    /// What is in a body, in a frame of it, or in the world; `of` is the body, so many bodies from the world.
+    fn body(&mut self, from: &Element, of: &str, depth: usize) -> Result<()> {
         self.attributes(from, &from.tag, of)?;
         let mut weighed = false;
         for inner in &from.children {
@@ -185,14 +185,18 @@ impl<'p> LeftOut<'p> {
                 "joint" | "freejoint" | "inertial" if from.tag == "worldbody" => {
                     return Err(inner.wrong_of(of, "the world has none: put it into a body"));
                 }
+                "joint" | "freejoint" if depth > 1 && is_free(inner) => {
+                    let why = "is free within another body: only bodies that are right in the <worldbody> may be; take the body out there";
+                    return Err(inner.wrong_of(of, why));
+                }
                 "body" => {
                     let name = inner.get("name");
                     let name = name.map_or("a body without a name".into(), |name| {
                         format!("body {name:?}")
                     });
-                    self.body(inner, &name)?;
+                    self.body(inner, &name, depth + 1)?;
                 }
-                "frame" => self.body(inner, of)?,
+                "frame" => self.body(inner, of, depth)?,
                 "inertial" => {
                     self.inertial(inner, of, weighed)?;
                     weighed = true;
@@ -225,4 +229,8 @@ impl<'p> LeftOut<'p> {
             None => Ok(()),
         }
     }
+}
+
+fn is_free(joint: &Element) -> bool {
+    joint.tag == "freejoint" || joint.get("type") == Some("free")
 }

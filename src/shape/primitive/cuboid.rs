@@ -38,8 +38,8 @@ fn face_count(cells: [usize; 3]) -> usize {
     side(cells[0], cells[1]) + side(cells[1], cells[2]) + side(cells[2], cells[0])
 }
 
-/// Part of the longest edge by which lengths may differ and have the same number of cells.
-const SAME: f64 = 1e-9;
+/// Part of the longest edge by which lengths may differ and have the same number of cells: a box that is nearly a cube has about the faces of one.
+const SAME: f64 = 0.02;
 
 /// Numbers of cells along x, y, z: near-square cells, near the target; equal lengths get equal
 /// numbers, so that a cube stays one.
@@ -48,9 +48,13 @@ fn choose_cells(size: [f64; 3], target: f64) -> [usize; 3] {
     // Scaled by the longest edge first: lengths may be as extreme as their type allows.
     let longest = a.max(b).max(c);
     let scaled = [a / longest, b / longest, c / longest];
-    // Lengths that differ by rounding are the same.
-    let first = |i: usize| (0..=i).find(|&j| (scaled[j] - scaled[i]).abs() <= SAME);
-    let alike = [0, 1, 2].map(|i| first(i).unwrap_or(i));
+    // Lengths that differ by little are the same.
+    let mut alike = [0, 1, 2];
+    for i in 1..3 {
+        if let Some(j) = (0..i).find(|&j| (scaled[j] - scaled[i]).abs() <= SAME) {
+            alike[i] = alike[j];
+        }
+    }
     let [a, b, c] = alike.map(|i| scaled[i]);
     let mut ideal = (4.0 * (a * b + b * c + c * a) / target).sqrt();
     // Where a side is thinner than a cell it takes one all the same: so many more of them that cells must be longer.

@@ -288,9 +288,10 @@ impl Contacts {
         most * (1.0 + 1e-9)
     }
 
-    /// How fast the surfaces of a pair change for one another by turning, rad/s: not by turns of round ones about an axis of theirs.
-    pub fn turning(&self, pair: &ContactPair, poses: &[Pose], twists: &[Vec6]) -> f64 {
-        let own = |b: usize, shape: &ContactShape| turning(shape, &poses[b], &twists[b]);
+    /// How fast the surfaces of a pair change for one another by turning, rad/s: turns of round ones about an axis of theirs, which change where friction pulls alone, count
+    /// by `round`.
+    pub fn turning(&self, pair: &ContactPair, poses: &[Pose], twists: &[Vec6], round: f64) -> f64 {
+        let own = |b: usize, shape: &ContactShape| turning(shape, &poses[b], &twists[b], round);
         let Some((first, second)) = self.solids(pair) else {
             return 0.0;
         };
@@ -301,9 +302,9 @@ impl Contacts {
         own(pair.first, first).max(other)
     }
 
-    /// The same of [`Contacts::turning`], rad/s, of a body at `pose` with this spatial twist.
+    /// The same of [`Contacts::turning`], rad/s, of a body at `pose` with this spatial twist; round ones turn about their axes as they like.
     pub fn share_turning(&self, b: usize, pose: &Pose, twist: &Vec6) -> f64 {
-        let turns = self.shapes[b].iter().map(|s| turning(s, pose, twist));
+        let turns = self.shapes[b].iter().map(|s| turning(s, pose, twist, 0.0));
         turns.fold(0.0, f64::max)
     }
 
@@ -336,24 +337,30 @@ fn half_thickness(shape: &ContactShape) -> (bool, f64) {
     }
 }
 
-/// How fast it turns about axes about which it isn't round, rad/s, with this spatial twist.
-fn turning(shape: &ContactShape, pose: &Pose, twist: &Vec6) -> f64 {
+/// How fast it turns, rad/s, with this spatial twist; about an axis about which it is round, by `round` of that. A ball looks the same however it turns.
+fn turning(shape: &ContactShape, pose: &Pose, twist: &Vec6, round: f64) -> f64 {
     let turn = pose.compose(&shape.solid.offset).rotation.transpose() * angular(twist);
-    let [x, y, z] = [turn.x, turn.y, turn.z].map(f64::abs);
+    let about = |axis: Vec3| {
+        let along = turn.dot(&axis).abs();
+        turn.cross(&axis).norm().max(round * along)
+    };
     match &shape.solid.form {
         Form::Ellipsoid(ellipsoid) => {
             let [a, b, c] = ellipsoid.semi_axes.into();
-            let about = |turn: f64, a: f64, b: f64| if a == b { 0.0 } else { turn };
-            about(x, b, c).max(about(y, c, a)).max(about(z, a, b))
+            match [b == c, c == a, a == b] {
+                [true, true, _] => 0.0,
+                [true, ..] => about(Vec3::x()),
+                [_, true, _] => about(Vec3::y()),
+                [.., true] => about(Vec3::z()),
+                _ => turn.norm(),
+            }
         }
-        Form::Core(core) => match core.corners.len() {
-            1 => 0.0,
-            2 => turn
-                .cross(&(core.corners[1] - core.corners[0]).normalize())
-                .norm(),
+        Form::Core(core) => match &core.corners[..] {
+            [_] => 0.0,
+            [a, b] => about((b - a).normalize()),
             _ => turn.norm(),
         },
-        Form::Cylinder(_) => x.hypot(y),
+        Form::Cylinder(_) => about(Vec3::z()),
     }
 }
 

@@ -9,7 +9,7 @@ use super::{Rollout, Sample, Simulator};
 use crate::adjoint::lie::{Vec3, Vec6, angular, point_velocity};
 use crate::adjoint::rigid::inertia_matrix;
 use crate::dynamics::force::ForceModel;
-use crate::dynamics::{Drive, Integrator, System};
+use crate::dynamics::{ContactForce, Drive, Integrator, System};
 use crate::error::readable;
 use crate::multibody::Link;
 use nalgebra::DVector;
@@ -131,7 +131,14 @@ impl Rollout {
         };
         // What presses from the start may give what was spent on pressing it together, which it does soon.
         let soon = (samples.iter().position(|s| s.time >= worst.0.time)).is_some_and(|n| n <= SOON);
-        let pressed = soon && self.contacts(0, 0.0).is_ok_and(|found| !found.is_empty());
+        // Of what is seen from farther because it closes fast nothing is pressed yet.
+        let touches = |c: &ContactForce| {
+            let both = std::iter::once(c.first).chain(c.second);
+            let widest = |b| (system.contact.as_ref()).map_or(0.0, |m| m.laws.widest(b));
+            c.gap < both.map(widest).fold(0.0, f64::max)
+        };
+        let found = self.contacts(0, 0.0);
+        let pressed = soon && found.is_ok_and(|found| found.iter().any(touches));
         let cause = match pressed {
             true => {
                 "surfaces start pressed together, nearer than the gap of contact: start them apart"

@@ -33,6 +33,8 @@ const DEEPER: f64 = 0.1;
 const LEFT: f64 = 0.1;
 /// The angle by which a piece may turn what touches, rad: laws of contact know surfaces that go straight on.
 const TURN: f64 = 0.3;
+/// Part by which turns of round bodies about their axes count there: a rim that friction stops turns the body another way.
+const ROUND: f64 = 0.3;
 /// Part of a joint's range that a piece may come nearer to its end by.
 const SHARE: f64 = 0.25;
 /// Part of the range that it may end past it.
@@ -318,7 +320,7 @@ impl Stepper<'_> {
                 near.dedup();
             }
             for k in &near {
-                if model.shapes.turning(k, poses, &twists) * dt > TURN
+                if model.shapes.turning(k, poses, &twists, ROUND) * dt > TURN
                     && presses(&start.near.contact_points, k, &acting)
                 {
                     out.turned.push(*k);

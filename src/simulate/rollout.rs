@@ -221,8 +221,7 @@ impl Rollout {
         let limit = (passed.limits.first()).and_then(|k| system.limits.get(*k));
         let other = |pair: &ContactPair| pair.second_body().map_or("a wall".into(), name);
         let pair = (passed.pairs.first()).map(|p| (p, "goes deep into"));
-        let turned =
-            (passed.turned.first()).map(|p| (p, "turns by more than 0.3 rad a piece against"));
+        let turned = (passed.turned.first()).map(|p| (p, "turns too far while it presses on"));
         let what = match (pair.or(turned), limit) {
             (Some((pair, does)), _) => {
                 format!("{} {does} {}", name(pair.first), other(pair))

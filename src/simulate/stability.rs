@@ -19,6 +19,8 @@ use nalgebra::DVector;
 pub(super) const GAIN: f64 = 0.02;
 /// States in which what is pressed together at the start comes apart.
 const SOON: usize = 20;
+/// The angle that a free body may turn by in a step, rad, before that is named as what the step is too long for.
+const RESOLVED: f64 = 1.0;
 /// How many times the energy of all bodies at the speeds of motions and currents counts as running away.
 const RUNAWAY: f64 = 1e4;
 
@@ -160,12 +162,11 @@ impl Rollout {
 
     /// What may be taken instead of a step that is too long, as a message ends.
     pub(super) fn finer(&self) -> String {
-        const RESOLVED: f64 = 1.0;
         let (turn, body) = self.largest_turn();
         if turn > RESOLVED {
             let name = &self.simulator.system().bodies[body].name;
             return format!(
-                "take a smaller one: body {name:?} turns by up to {} rad in a step, and no integrator resolves more than about one",
+                "take a smaller one: body {name:?} turns by up to {} rad in a step",
                 readable((turn * 10.0).round() / 10.0)
             );
         }

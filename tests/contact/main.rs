@@ -16,7 +16,6 @@ mod pressed;
 mod resistance;
 mod standard;
 mod thin;
-
 mod tools;
 mod wet;
 

@@ -81,7 +81,7 @@ fn needles(random: &mut Samples) -> Scene {
     scene
 }
 
-/// Twenty pairs of them. A blow on the side of one has it spin at hundreds of rad/s, which a step doesn't resolve: such runs gained up to 250 times their energy, or failed.
+/// Twenty pairs of them. A blow on the side of one has it spin at hundreds of rad/s, which a step doesn't resolve: such runs gained up to 155 times their energy, or failed.
 #[test]
 fn needles_gain_no_energy() {
     for integrator in CONTACT_INTEGRATORS {

@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Films that were made stay up to so many times those that are near, and a few.
 const KEPT: usize = 4;
 const FEW: usize = 256;
-/// Faces in films from which on it pays to wake other threads: what is asked takes about a microsecond of each.
+/// Faces in films from which on it pays to wake other threads.
 const WORTH_WAKING: usize = 400;
 
 /// What each film gives, in order.

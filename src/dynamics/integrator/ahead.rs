@@ -31,8 +31,10 @@ const DEEP: f64 = 0.5;
 const DEEPER: f64 = 0.1;
 /// Part of the gap at which surfaces touch that a piece leaves, where there is water.
 const LEFT: f64 = 0.1;
-/// The angle by which a piece may turn what touches, rad: laws of contact know surfaces that go straight on.
+/// The angle by which a piece may turn what presses, rad: laws of contact know surfaces that go straight on.
 const TURN: f64 = 0.3;
+/// The same of what floats freely.
+const FREE_TURN: f64 = 1.0;
 /// Part by which turns of round bodies about their axes count there: a rim that friction stops turns the body another way.
 const ROUND: f64 = 0.3;
 /// Part of a joint's range that a piece may come nearer to its end by.
@@ -149,11 +151,16 @@ fn presses(points: &[PairContact], k: &ContactPair, twists: &[Vec6]) -> bool {
     own.any(|c| contact_force(&c.law, &c.point_state(twists)).force != Vec3::zeros())
 }
 
-/// Whether a pair gets too deep within the time `dt` of one of so many pieces: halfway, or where it nearly is already and is pressed there, by all pieces together, little
+/// Whether a pair gets too deep from these poses, with these twists, within the time `dt` of one of so many pieces: halfway, or where it nearly is already and is pressed there, by all pieces together, little
 /// deeper.
-fn deep(way: &Way, model: &ContactModel, k: &ContactPair, dt: f64, pieces: usize) -> bool {
+fn deep(
+    way: &Way,
+    (poses, twists): (&[Pose], &[Vec6]),
+    model: &ContactModel,
+    k: &ContactPair,
+    (dt, pieces): (f64, usize),
+) -> bool {
     let shapes = &model.shapes;
-    let (poses, twists) = way.start.get_or_init(|| way.at(0.0));
     let halfway = shapes.halfway(k);
     let (most, share) = (DEEP * halfway, DEEPER * halfway / pieces as f64);
     let closing = shapes.closing(k, poses, twists) * dt;
@@ -218,7 +225,7 @@ impl Stepper<'_> {
                 if link.q.len() > link.v.len() {
                     let pose = &e.kinematics.poses[b];
                     let turn = model.shapes.share_turning(b, pose, &twists[b]) * dt;
-                    plan.pieces = plan.pieces.max(pieces(turn));
+                    plan.pieces = plan.pieces.max(pieces(turn / FREE_TURN));
                 }
             }
         }
@@ -311,7 +318,7 @@ impl Stepper<'_> {
             let way = Way::new(system, &e.q, v);
             let poses = &e.kinematics.poses;
             let twists = system.tree.twists(&e.kinematics, v);
-            let acting = system.tree.twists(&e.kinematics, velocities.acting());
+            let acting = || system.tree.twists(&e.kinematics, velocities.acting());
             let mut near = met_within(model, poses, &twists, dt);
             if wet {
                 let end = &way.end.get_or_init(|| way.at(dt)).0;
@@ -321,7 +328,7 @@ impl Stepper<'_> {
             }
             for k in &near {
                 if model.shapes.turning(k, poses, &twists, ROUND) * dt > TURN
-                    && presses(&start.near.contact_points, k, &acting)
+                    && presses(&start.near.contact_points, k, &acting())
                 {
                     out.turned.push(*k);
                 }
@@ -329,7 +336,7 @@ impl Stepper<'_> {
                     continue;
                 }
                 let dry = wet && closed(&way, model, k, dt);
-                if dry || deep(&way, model, k, dt, start.plan.pieces) {
+                if dry || deep(&way, (poses, &twists), model, k, (dt, start.plan.pieces)) {
                     out.pairs.push(*k);
                 }
             }

@@ -59,15 +59,8 @@ impl<'a> Stepper<'a> {
 
     /// What of it presses more stiffly in more pieces: a stiffness that was given stays what it is.
     fn rigid(&self, passed: &Stops) -> Stops {
-        let mut out = Stops::default();
-        out.add(passed);
-        out.pairs.append(&mut out.turned);
-        out.pairs.sort_unstable();
-        out.pairs.dedup();
-        if self.system.contact.as_ref().is_some_and(|m| !m.rigid) {
-            out.pairs.clear();
-        }
-        out
+        let contact = self.system.contact.as_ref();
+        passed.sharper(contact.is_none_or(|m| m.rigid))
     }
 
     /// Whether what was passed asks for another plan.

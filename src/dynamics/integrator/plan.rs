@@ -13,7 +13,7 @@ pub(super) const SEEN: usize = 64;
 pub struct Stops {
     /// Of [`Contacts::pairs`](crate::contact::Contacts::pairs), ascending.
     pub pairs: Vec<ContactPair>,
-    /// Those that touch while one of the two turns too far.
+    /// Those that press while one of the two turns too far, ascending.
     pub turned: Vec<ContactPair>,
     /// Of [`System::limits`](crate::dynamics::System::limits), ascending.
     pub limits: Vec<usize>,
@@ -23,6 +23,19 @@ impl Stops {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.pairs.is_empty() && self.turned.is_empty() && self.limits.is_empty()
+    }
+
+    /// What of it presses more stiffly in more pieces: limits, and pairs where contact is `rigid`.
+    pub(super) fn sharper(&self, rigid: bool) -> Self {
+        let mut out = Self {
+            limits: self.limits.clone(),
+            ..Self::default()
+        };
+        if rigid {
+            add(&mut out.pairs, &self.pairs);
+            add(&mut out.pairs, &self.turned);
+        }
+        out
     }
 
     /// Adds others.

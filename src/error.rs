@@ -127,6 +127,15 @@ pub(crate) fn readable(time: f64) -> f64 {
 }
 
 impl Error {
+    /// What is wrong, of a mesh without its name, where the place says it.
+    #[cfg(feature = "urdf")]
+    pub(crate) fn problem(self) -> String {
+        match self {
+            Self::Mesh { problem, .. } => problem,
+            other => other.to_string(),
+        }
+    }
+
     /// The same, for lengths that were given in units of `size` m.
     pub(crate) fn in_units_of(mut self, size: f64) -> Self {
         match &mut self {

@@ -46,6 +46,11 @@ pub trait Response: Send + Sync {
         0.0
     }
 
+    /// How often the edges of the body's faces were halved for it.
+    fn halved(&self) -> usize {
+        0
+    }
+
     /// Estimated relative error of the added mass, where two resolutions tell one.
     fn error(&self) -> Option<f64> {
         None

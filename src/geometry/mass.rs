@@ -62,6 +62,25 @@ impl MassProperties {
         }
     }
 
+    /// What is left of it once a part within it is taken out; the surface grows by that of the part.
+    #[cfg(feature = "urdf")]
+    pub(crate) fn less(&self, part: &Self) -> Self {
+        let volume = self.volume - part.volume;
+        let first = self.volume * self.centroid - part.volume * part.centroid;
+        let centroid = first / volume;
+        let moved = |of: &Self| {
+            let away = of.centroid - centroid;
+            let steiner = Mat3::identity() * away.norm_squared() - away * away.transpose();
+            of.inertia + of.volume * steiner
+        };
+        Self {
+            volume,
+            area: self.area + part.area,
+            centroid,
+            inertia: moved(self) - moved(part),
+        }
+    }
+
     /// The same of the body placed at `pose`.
     pub fn transformed(&self, pose: &Pose) -> Self {
         Self {

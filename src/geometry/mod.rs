@@ -18,6 +18,8 @@ mod beneath;
 mod boxes;
 mod broad;
 mod casing;
+#[cfg(feature = "urdf")]
+mod cavities;
 mod check;
 mod cluster;
 pub(crate) mod convex;
@@ -47,6 +49,8 @@ pub(crate) mod weld;
 pub(crate) use beneath::Beneath;
 pub(crate) use broad::{Neighbours, Region};
 pub(crate) use casing::Casing;
+#[cfg(feature = "urdf")]
+pub(crate) use cavities::with_cavities;
 #[cfg(feature = "meshio")]
 pub(crate) use check::has_area;
 pub use check::{Finding, Kind, MeshReport, Severity, check_parts};
@@ -66,6 +70,6 @@ pub(crate) use opposite::Opposite;
 pub use pairing::Pairing;
 pub use points::Ball;
 pub(crate) use points::bounds;
-pub(crate) use refine::divided;
 pub use refine::{ExactSurface, MAX_ADDED_FACES, Refinement, refine, validate_refinements};
+pub(crate) use refine::{divided, halved};
 pub use wall::{HalfSpace, Wall, WallSurface};

@@ -68,11 +68,6 @@ impl MeshTree {
         longest * (1.0 + 1e-12)
     }
 
-    /// Number of faces.
-    pub fn len(&self) -> usize {
-        self.triangles.len()
-    }
-
     /// Area of a face, m².
     pub fn area(&self, face: usize) -> f64 {
         self.area_vector(face).norm()

@@ -301,10 +301,7 @@ impl<'f> Meshes<'f> {
         if let Ok(mesh) = other.into_mesh() {
             return Ok(Ok(Own { mesh, turned: true }));
         }
-        Ok(Err(match error {
-            Error::Mesh { problem, .. } => problem,
-            error => error.to_string(),
-        }))
+        Ok(Err(error.problem()))
     }
 
     /// As [`Piece::hull`], with an error that names the link.

@@ -6,9 +6,9 @@ use super::options::Options;
 use super::pieces::{Form, Meshes, Own, Piece, moved};
 use super::report::Report;
 use super::tree::Group;
+use crate::Result;
 use crate::geometry::{MassProperties, Solid, TriMesh};
 use crate::shape::{Shape, build, solid};
-use crate::{Error, Result};
 use hydrograd_adjoint::lie::{Pose, Vec3};
 use nalgebra::Isometry3;
 use std::path::Path;
@@ -172,10 +172,7 @@ impl Immersed {
                         });
                     }
                     Err(error) => {
-                        let why = match error {
-                            Error::Mesh { problem, .. } => problem,
-                            other => other.to_string(),
-                        };
+                        let why = error.problem();
                         let faces = mesh.faces().len();
                         format!(
                             "it is closed, but has {faces} faces, and with about {most} (`faces`) it would be no surface: {why}"

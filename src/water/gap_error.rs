@@ -8,6 +8,7 @@
 //! s = e²/(8 R h)                                              films (of their own faces) and panels: how far the faces lie inside the surfaces, in the gap
 //! R over the radius of the ball of equal volume               round, or flat
 //! x = max(e, r)/(h + s)                                       a body of size s beside one much larger, whose faces or sources are coarse for it
+//! e²/w²                                                       panels, of which few cover flat surfaces of the width w; e² is the product of both edges
 //! ```
 //!
 //! The constants are fitted to `cargo bench --bench gap` (docs/accuracy-coupled.md), those of x to the cases of tests/water/gap_error.rs; by more than a factor of three they are not to fall under
@@ -64,6 +65,10 @@ pub(crate) struct Across {
     pub curvature: f64,
     /// Of the ball as large as the smaller body, m.
     pub size: f64,
+    /// The area over which the surfaces are near, m².
+    pub area: f64,
+    /// The product of the edges that the faces there have on either side, m².
+    pub edges: f64,
     /// The gap, as far as the image behind a wall, over what compressed sources resolve.
     pub ratio: f64,
     /// Relative error that compression aims at.
@@ -104,6 +109,8 @@ const PANELS: f64 = 0.01;
 const FACETS: f64 = 0.13;
 /// What panels between flat surfaces add below a tenth of an edge.
 const THIN: f64 = 0.08;
+/// Of the added mass between flat surfaces that few panels cover, by the product of both edges over the area.
+const FEW: f64 = 0.5;
 /// Parts of the force's error in that of the added mass: of round surfaces, and what flat ones add to it in a film.
 const MASS: f64 = 0.1;
 const MASS_FLAT: f64 = 0.5;
@@ -212,7 +219,13 @@ impl Across {
 
     /// By what coupled panels have there.
     pub fn coupled(&self) -> GapError {
-        self.taken_over(self.by_panels(), self.by_film(FILM_OF_PANELS))
+        let mut error = self.taken_over(self.by_panels(), self.by_film(FILM_OF_PANELS));
+        // From a gap as wide as the area on there is little to lose.
+        let open = 1.0 + self.gap.powi(2) / self.area.max(self.edges);
+        let few = self.flatness() * FEW * (self.edges / self.area).min(1.0) / open;
+        error.added_mass += few;
+        error.force = (error.force + few / (MASS + MASS_FLAT)).min(MOST);
+        error
     }
 
     /// By panels.

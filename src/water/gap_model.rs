@@ -62,6 +62,10 @@ impl GapModel {
         let beyond = beyond(gap);
         let near = gaps.near_faces(gap, beyond, poses);
         let area = near[0].area.max(near[1].area);
+        let mut edges = near.map(|side| side.edge().unwrap_or(gap.edge));
+        if let Other::Wall(_) = gap.second {
+            edges[1] = edges[0];
+        }
         let film = self.film(gap);
         let film_edge = film.map_or(gap.edge, |(film, second)| {
             let carries = near[usize::from(second)].edge();
@@ -75,6 +79,8 @@ impl GapModel {
             film_edge,
             curvature: (area / (2.0 * PI * beyond)).max(LEAST * gap.edge),
             size: clearance.size(gap),
+            area,
+            edges: edges.iter().product(),
             expanse: clearance.expanse(gap),
             resolved,
             ratio: ratio.max(LEAST),

@@ -247,6 +247,51 @@ fn masses_of_notched_meshes_are_of_their_volume() {
     );
 }
 
+/// A cavity is no part of a mass; it was that of the hull, for the reason that the surface "isn't closed".
+#[test]
+fn masses_of_hollow_meshes_are_without_the_hollow() {
+    let text = r#"<mujoco><asset><mesh name="m" file="hollow.obj"/></asset><worldbody>
+        <body name="a"><freejoint/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>"#;
+    let hollow = |at: f64| {
+        let mut file = String::new();
+        for (half, at) in [(0.1, 0.0), (0.05, at)] {
+            for [x, y, z] in [0, 1, 2, 3, 4, 5, 6, 7].map(|c| [c & 1, c >> 1 & 1, c >> 2]) {
+                let [x, y, z] = [x, y, z].map(|s| half * f64::from(2 * s - 1));
+                writeln!(file, "v {} {y} {z}", x + at).unwrap();
+            }
+        }
+        for [a, b, c, d] in [
+            [1, 3, 4, 2],
+            [5, 6, 8, 7],
+            [1, 2, 6, 5],
+            [3, 7, 8, 4],
+            [1, 5, 7, 3],
+            [2, 4, 8, 6],
+        ] {
+            writeln!(file, "f {a} {b} {c} {d}").unwrap();
+            writeln!(file, "f {} {} {} {}", d + 8, c + 8, b + 8, a + 8).unwrap();
+        }
+        file
+    };
+    let (folder, path) = folder(|_| text.into());
+    let read = |at: f64| {
+        std::fs::write(folder.path().join("hollow.obj"), hollow(at)).unwrap();
+        let mut scene = Scene::new(Fluid::fresh_water());
+        scene.add_robot(&path, &Robot::default()).unwrap().report
+    };
+    let report = read(0.02);
+    assert!((report.mass - 7.0).abs() < 1e-12, "{}", report.mass);
+    let center = report.center_of_mass;
+    assert!((center[0] + 0.02 / 7.0).abs() < 1e-15, "{center:?}");
+    says(report.to_string(), &["hollow.obj", "7.0000e-3 m³"]);
+    // Turned round and outside, it is no cavity, and the hull's mass has its reason.
+    let report = read(0.3);
+    says(
+        report.to_string(),
+        &["hollow.obj", "its convex hull (", "pointing inward"],
+    );
+}
+
 /// Frames move pieces between two points, sites may have names of bodies, joints start at their references, and equalities that aren't active couple nothing.
 #[test]
 fn the_finer_print_is_read() {

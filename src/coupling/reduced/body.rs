@@ -56,6 +56,8 @@ pub struct Fit {
     pub resolved_gap: f64,
     /// Regions in which it is smaller.
     pub regions: Vec<Region>,
+    /// How often the edges of its faces were halved for what it was fitted to.
+    pub halved: usize,
     /// Points on the surfaces around the body at which it was fitted.
     pub proxies: usize,
     /// The tolerance that the fit to them meets.

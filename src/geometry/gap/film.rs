@@ -1,6 +1,7 @@
 //! How much of two surfaces lies face to face.
 
 use super::{Gap, Gaps, Other};
+use crate::geometry::boxes::Node;
 use hydrograd_adjoint::lie::{Pose, Vec3};
 
 /// Part of the gap by which distances may exceed it where surfaces count as parallel.
@@ -111,10 +112,27 @@ impl Gaps {
                 (tree.closest(&x).0 - x).norm()
             }),
         };
-        let of = |f: usize| (f, distance(&pose.apply(&tree.centroid(f))));
-        (0..tree.len())
-            .map(of)
-            .filter(|(_, d)| *d <= limit)
-            .collect()
+        // Boxes first: most are so far away that none of their faces can be that near.
+        let far = |node: &Node| {
+            let reach = node.half.norm();
+            let slack = 1e-12 * (node.center.norm() + pose.translation.norm() + reach);
+            distance(&pose.apply(&node.center)) > limit + reach + slack
+        };
+        let mut out = Vec::new();
+        let mut stack = vec![0];
+        while let Some(number) = stack.pop() {
+            let node = &tree.nodes[number];
+            match node.second {
+                _ if far(node) => {}
+                // In the order of the faces.
+                Some(second) => stack.extend([second, number + 1]),
+                None => out.extend(
+                    (node.faces.clone())
+                        .map(|f| (f, distance(&pose.apply(&tree.centroid(f)))))
+                        .filter(|(_, d)| *d <= limit),
+                ),
+            }
+        }
+        out
     }
 }

@@ -65,6 +65,24 @@ impl Gap {
     }
 }
 
+/// A gap whose edge isn't looked up: of many candidates only that of the smallest is wanted.
+struct Found {
+    distance: f64,
+    first: usize,
+    second: Other,
+    near: Near,
+}
+
+/// Where a gap's edge is to be found.
+enum Near {
+    /// At the closest points, each in its body's frame.
+    Points([Vec3; 2]),
+    /// At the first body's, before a wall.
+    Point(Vec3),
+    /// It is known, m.
+    Edge(f64),
+}
+
 /// Signed distance of a point from a surface or a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
@@ -230,47 +248,70 @@ impl Gaps {
     }
 
     /// A pair's gap if it is below `limit`.
-    fn gap(&self, (first, second): (usize, Other), poses: &[Pose], limit: f64) -> Option<Gap> {
+    fn gap(&self, pair: (usize, Other), poses: &[Pose], limit: f64) -> Option<Gap> {
+        Some(self.whole(&self.found(pair, poses, limit)?))
+    }
+
+    /// How far a pair is apart if that is below `limit`; the edge there isn't looked up.
+    fn found(&self, (first, second): (usize, Other), poses: &[Pose], limit: f64) -> Option<Found> {
         let placed = |i: usize| Some((self.trees.get(i)?.as_ref()?, poses.get(i)?));
         let solid = |i: usize| self.solids.get(i)?.as_ref();
         let (tree, pose) = placed(first)?;
-        let Between { distance, edge } = match second {
+        let (distance, near) = match second {
             Other::Body(j) => {
                 let (other, other_pose) = placed(j)?;
                 match (solid(first), solid(j)) {
                     (Some(a), Some(b)) => {
                         let found = a.between(pose, b, other_pose)?;
-                        let [x, y] = &found.points;
-                        let edge = || tree.edge_near(x).max(other.edge_near(y));
-                        let below = found.distance < limit;
-                        Between {
-                            distance: found.distance,
-                            edge: if below { edge() } else { 0.0 },
-                        }
+                        (found.distance, Near::Points(found.points))
                     }
-                    _ => Pair::new((tree, pose), (other, other_pose))?.between(limit)?,
+                    _ => {
+                        let pair = Pair::new((tree, pose), (other, other_pose))?;
+                        let Between { distance, edge } = pair.between(limit)?;
+                        (distance, Near::Edge(edge))
+                    }
                 }
             }
             Other::Wall(w) => match solid(first) {
                 Some(a) => {
                     let (distance, lowest) = a.height(pose, &self.walls[w]);
-                    Between {
-                        distance,
-                        edge: tree.edge_near(&lowest),
-                    }
+                    (distance, Near::Point(lowest))
                 }
                 None => {
                     let (distance, edge) = tree.height(pose, &self.walls[w]);
-                    Between { distance, edge }
+                    (distance, Near::Edge(edge))
                 }
             },
         };
-        (distance.is_finite() && distance < limit).then_some(Gap {
+        (distance.is_finite() && distance < limit).then_some(Found {
+            distance,
+            first,
+            second,
+            near,
+        })
+    }
+
+    /// With the edge at the closest points.
+    fn whole(&self, found: &Found) -> Gap {
+        let Found {
+            distance,
+            first,
+            second,
+            ref near,
+        } = *found;
+        let edge =
+            |body: usize, x: &Vec3| self.trees[body].as_ref().map_or(0.0, |t| t.edge_near(x));
+        let edge = match (near, second) {
+            (Near::Edge(edge), _) => *edge,
+            (Near::Points([x, y]), Other::Body(j)) => edge(first, x).max(edge(j, y)),
+            (Near::Points([x, _]) | Near::Point(x), _) => edge(first, x),
+        };
+        Gap {
             distance,
             first,
             second,
             edge,
-        })
+        }
     }
 
     /// Distances of a point (world frame) from every surface's mesh, around which flows are made, one pose per mesh, and then from every wall. A pose that is missing or

@@ -1,6 +1,6 @@
 //! The smallest of all gaps, and those under a distance, without looking at bodies that are far apart.
 
-use super::{Gap, Gaps, Other};
+use super::{Found, Gap, Gaps, Other};
 use crate::geometry::broad::{Neighbours, Region};
 use crate::geometry::convex::Solid;
 use crate::geometry::points::Ball;
@@ -21,7 +21,7 @@ impl Gaps {
     /// finite are passed over.
     pub fn smallest(&self, poses: &[Pose]) -> Option<Gap> {
         let balls = self.balls(poses);
-        let mut best: Option<Gap> = None;
+        let mut best: Option<Found> = None;
         // Pairs up to a distance at a time, each time farther: the nearest first by the balls around them.
         let (mut from, mut to) = (f64::NEG_INFINITY, mean_radius(&balls));
         loop {
@@ -29,16 +29,14 @@ impl Gaps {
             waiting.retain(|c| c.bound >= from);
             waiting.sort_by(|a, b| a.bound.total_cmp(&b.bound).then(a.pair.cmp(&b.pair)));
             for Candidate { bound, pair } in waiting {
-                let limit = best.map_or(f64::INFINITY, |gap| gap.distance);
+                let limit = best.as_ref().map_or(f64::INFINITY, |gap| gap.distance);
                 if bound > 0.0 && bound >= limit {
-                    return best;
+                    return best.map(|gap| self.whole(&gap));
                 }
-                if let Some(gap) = self.gap(pair, poses, limit) {
-                    best = Some(gap);
-                }
+                best = self.found(pair, poses, limit).or(best);
             }
-            if to == f64::INFINITY || best.is_some_and(|gap| gap.distance <= to) {
-                return best;
+            if to == f64::INFINITY || best.as_ref().is_some_and(|gap| gap.distance <= to) {
+                return best.map(|gap| self.whole(&gap));
             }
             (from, to) = (to, farther(&balls, to));
         }
@@ -70,8 +68,7 @@ impl Gaps {
     ) -> Vec<Gap> {
         let near = self.candidates(poses, &self.balls(poses), distance);
         let near = near.into_iter().filter(|c| wanted(c.pair));
-        near.filter_map(|c| self.gap(c.pair, poses, f64::INFINITY))
-            .filter(|gap| gap.distance < distance)
+        near.filter_map(|c| self.gap(c.pair, poses, distance))
             .collect()
     }
 

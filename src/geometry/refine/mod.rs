@@ -8,9 +8,11 @@ mod bisection;
 mod divide;
 mod exact;
 mod flip;
+mod halve;
 
 pub(crate) use divide::divided;
 pub use exact::ExactSurface;
+pub(crate) use halve::halved;
 
 use crate::error::{Error, Result};
 use crate::geometry::mesh::TriMesh;

@@ -2,7 +2,7 @@
 
 use super::super::inertia::Inertial;
 use super::super::pieces::Loaded;
-use crate::geometry::MassProperties;
+use crate::geometry::{MassProperties, with_cavities};
 use crate::shape::Shape;
 use crate::shape::file::FileMesh;
 use crate::{Error, Result};
@@ -149,7 +149,8 @@ impl<'m> Geometries<'m> {
         Ok(Some(own.moved(at)))
     }
 
-    /// Of a mesh itself or, where it isn't closed, of its convex hull, at a density of one; none if that has no volume.
+    /// Of a mesh itself, without its cavities, or, where it encloses no volume, of its convex hull, at a density of one; none if that has no
+    /// volume.
     fn of_mesh(
         &self,
         file: &Path,
@@ -157,15 +158,20 @@ impl<'m> Geometries<'m> {
         notes: &mut Vec<String>,
     ) -> Result<Option<MassProperties>> {
         let loaded = Loaded::new(file.to_owned(), scale, &self.place())?;
-        let closed = loaded.mesh.clone().into_mesh().ok();
-        let (whole, whose) = match closed {
-            Some(mesh) => (Some(mesh), "the volume that it encloses"),
-            None => {
+        let FileMesh {
+            name,
+            vertices,
+            faces,
+            ..
+        } = &loaded.mesh;
+        let (found, whose) = match with_cavities(name, vertices, faces) {
+            Ok(found) => (found, "the volume that it encloses".to_owned()),
+            Err(error) => {
                 let hull = loaded.fine().map_err(|e| e.of(&self.place()))?;
-                (hull.cloned(), "its convex hull, as it isn't closed")
+                let whose = format!("its convex hull ({})", error.problem());
+                (hull.map(|mesh| mesh.mass_properties()), whose)
             }
         };
-        let found = whole.map(|mesh| mesh.mass_properties());
         if let Some(found) = &found {
             let other = legacy_volume(&loaded.mesh);
             if (other - found.volume).abs() > SAME * found.volume {

@@ -203,8 +203,9 @@ impl<'a> Case<'a> {
         let own = self.submerged(&self.surfaces);
         let coupling = compressed_all(&self.problem(&own))?;
         let made = coupling.reduced_bodies().iter();
-        let gaps: Vec<f64> = made.map(|b| b.parts().fit.finest()).collect();
-        let responses = responses(&self.problem(bodies), &gaps)?;
+        let fits = made.map(|b| &b.parts().fit);
+        let resolved: Vec<_> = fits.map(|fit| (fit.finest(), fit.halved)).collect();
+        let responses = responses(&self.problem(bodies), &resolved)?;
         let mut out = coupling.correction(&self.poses, &self.turn, &responses)?;
         // Of a body whose own is given, what others and walls change is all that its answers tell.
         for (b, _) in (bodies.iter().enumerate()).filter(|(_, body)| body.added_mass.is_some()) {

@@ -1,10 +1,11 @@
 //! Bodies compressed to a few sources, and how these change with shapes.
 
+use super::finer;
 use super::isolated::alone_slopes;
 use crate::adjoint::lie::{Pose, Vec3};
 use crate::coupling::reduced::{ReducedBody, Region, ShapeSlope, cache, compress};
 use crate::geometry::TriMesh;
-use crate::water::method::kind::{BodyMethod, Problem};
+use crate::water::method::kind::{BodyMethod, Problem, Solved};
 use crate::water::numerics::Numerics;
 use crate::water::shape::ShapeChange;
 use crate::water::submerged::SubmergedBody;
@@ -48,6 +49,8 @@ struct InUnits<'a> {
     numerics: Numerics,
     /// The smallest gap that it resolves anywhere.
     finest: f64,
+    /// How often its edges are halved for what it is fitted to.
+    halved: usize,
 }
 
 impl<'a> InUnits<'a> {
@@ -77,9 +80,9 @@ impl<'a> InUnits<'a> {
             (axes.map(round), at)
         });
         let gap = chosen.resolved_gap.map(round);
-        let gap = gap.unwrap_or_else(|| {
-            compress::default_gap(mesh.mass_properties().volume, mesh.surface_area())
-        });
+        let (volume, area) = (mesh.mass_properties().volume, mesh.surface_area());
+        let thin = compress::usual_gap(volume, area);
+        let gap = gap.unwrap_or_else(|| compress::default_gap(volume, area));
         let regions: Vec<Region> = (body.regions.iter())
             .map(|r| Region {
                 center: r.center.map(round),
@@ -92,6 +95,7 @@ impl<'a> InUnits<'a> {
             name: body.name,
             size,
             finest: regions.iter().map(|r| r.gap).fold(everywhere, f64::min),
+            halved: finer::halvings(method, &mesh, gap.min(thin)),
             mesh,
             coarse,
             ellipsoid,
@@ -114,6 +118,12 @@ impl<'a> InUnits<'a> {
             added_mass: None,
             regions: Vec::new(),
         }
+    }
+
+    /// What it answers.
+    fn response(&self, method: &dyn BodyMethod) -> Solved {
+        let resolved = (self.finest, self.halved);
+        finer::response(method, &self.body(), &self.numerics, resolved)
     }
 
     /// With a shape parameter changed by `t`, m; the faces stay.
@@ -152,10 +162,10 @@ pub(super) fn compressed_body(
     chosen: &compress::CompressSettings,
 ) -> Result<cache::Fetched> {
     let own = InUnits::new(body, method, chosen, problem.numerics)?;
-    let made_from = method.made_from(&own.body(), &own.numerics);
+    let made_from = (method.made_from(&own.body(), &own.numerics), own.halved);
     let key = cache::Key::new(&own.mesh, &made_from, &own.settings, &own.regions);
     let found = cache::fetch(key, problem.folder, || {
-        let response = method.response(&own.body(), &own.numerics, own.finest)?;
+        let response = own.response(method)?;
         let (settings, regions) = (&own.settings, &own.regions);
         compress::compress(body.name, &own.mesh, response.as_ref(), settings, regions)
     });
@@ -197,7 +207,8 @@ pub(super) fn shape_slopes(
         }
         let method = problem.method_for(body)?;
         let units = InUnits::new(body, method, problem.chosen(b), problem.numerics)?;
-        let (size, own) = (units.size, alone_slopes(problem, body, group)?);
+        let finer = finer::Halved::new(body, units.halved);
+        let (size, own) = (units.size, alone_slopes(problem, &finer.body(body), group)?);
         let moving: Vec<_> = group
             .iter()
             .map(|(_, change)| move |p: &Vec3| units_velocity(change, size, p))
@@ -216,10 +227,7 @@ pub(super) fn shape_slopes(
             .iter()
             .map(|(_, change)| {
                 let units = &units;
-                move |t: f64| {
-                    let changed = units.changed(change, t);
-                    method.response(&changed.body(), &units.numerics, units.finest)
-                }
+                move |t: f64| units.changed(change, t).response(method)
             })
             .collect();
         let each = group.iter().zip(&moving).zip(&answering).zip(own);
@@ -233,7 +241,7 @@ pub(super) fn shape_slopes(
                 },
             )
             .collect();
-        let response = method.response(&units.body(), &units.numerics, units.finest)?;
+        let response = units.response(method)?;
         let (settings, regions) = (&units.settings, &units.regions);
         let points = made[b].parts().points.iter();
         let points: Vec<Vec3> = points.map(|p| p / size).collect();

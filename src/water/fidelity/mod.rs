@@ -4,6 +4,7 @@
 
 mod auto;
 mod compressed;
+mod finer;
 mod full;
 mod given;
 mod isolated;

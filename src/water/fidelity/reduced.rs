@@ -1,6 +1,7 @@
 //! All bodies coupled, each compressed to a few sources.
 
 use super::compressed::{compressed_body, shape_slopes};
+use super::finer;
 use super::kind::{FidelityKind, Knob};
 use crate::Result;
 use crate::boundary::Response;
@@ -184,21 +185,22 @@ fn film_surfaces<'p>(problem: &Problem<'p>) -> Result<Option<FilmSurfaces<'p>>> 
     Ok(Some((surfaces, tolerances.collect())))
 }
 
-/// What each body answers by its own method; bodies that are equal share one. Sources as near as
-/// `gaps` (m, one a body) are resolved where the method has to know.
+/// What each body answers by its own method; bodies that are equal share one. Sources as near as the first of
+/// `resolved` (m, one a body) are resolved where the method has to know, with edges halved so many times.
 pub(in crate::water) fn responses(
     problem: &Problem,
-    gaps: &[f64],
+    resolved: &[(f64, usize)],
 ) -> Result<Vec<Arc<dyn Response>>> {
     let bodies = problem.bodies;
     let mut out: Vec<Arc<dyn Response>> = Vec::with_capacity(bodies.len());
     for (b, body) in bodies.iter().enumerate() {
-        let same = |a: &usize| bodies[*a].equal(body) && gaps[*a] == gaps[b];
+        let same = |a: &usize| bodies[*a].equal(body) && resolved[*a] == resolved[b];
         out.push(match (0..b).find(same) {
             Some(a) => out[a].clone(),
             None => {
                 let method = problem.method_for(body)?;
-                Arc::from(method.response(body, problem.numerics, gaps[b])?)
+                let made = finer::response(method, body, problem.numerics, resolved[b])?;
+                Arc::from(made)
             }
         });
     }

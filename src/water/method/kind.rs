@@ -48,6 +48,11 @@ pub(crate) trait BodyMethod: Send + Sync {
         false
     }
 
+    /// Whether its answers are those of panels, which finer faces make better.
+    fn by_panels(&self) -> bool {
+        false
+    }
+
     /// The surface around which it is compressed, in the body's frame.
     fn layout<'a>(&self, body: &SubmergedBody<'a>) -> Result<Cow<'a, TriMesh>> {
         Ok(Cow::Borrowed(body.surface("reduced")?))

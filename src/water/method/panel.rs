@@ -195,6 +195,10 @@ impl BodyMethod for Panel {
         true
     }
 
+    fn by_panels(&self) -> bool {
+        true
+    }
+
     fn steps_together(&self) -> bool {
         true
     }

@@ -306,6 +306,7 @@ pub fn compress(
         fit: Fit {
             resolved_gap: chosen.gap,
             regions: chosen.regions,
+            halved: response.halved(),
             proxies: chosen.fitted.points.len(),
             reached: (chosen.left / REST).powi(2),
             asymmetry: chosen.asymmetry,
@@ -334,9 +335,14 @@ pub fn finest_gap(area: f64) -> f64 {
 }
 
 /// The gap (m) that a body of `volume` (m³) and surface `area` (m²) resolves where nothing is asked for:
-/// a quarter of the radius of the ball with this ratio of volume to area.
+/// [`usual_gap`], or the finest that it can.
 pub fn default_gap(volume: f64, area: f64) -> f64 {
-    (0.75 * volume / area).max(finest_gap(area))
+    usual_gap(volume, area).max(finest_gap(area))
+}
+
+/// A quarter of the radius of the ball with this ratio of volume to area, m.
+pub fn usual_gap(volume: f64, area: f64) -> f64 {
+    0.75 * volume / area
 }
 
 /// Replaces the matrix by its symmetric part; the largest difference from its transpose, relative to

@@ -95,7 +95,7 @@ impl<'a> InUnits<'a> {
             name: body.name,
             size,
             finest: regions.iter().map(|r| r.gap).fold(everywhere, f64::min),
-            halved: finer::halvings(method, &mesh, gap.min(thin)),
+            halved: finer::halvings(method, &mesh, everywhere.min(thin)),
             mesh,
             coarse,
             ellipsoid,

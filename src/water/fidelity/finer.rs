@@ -15,7 +15,7 @@ use crate::water::surface::Coarse;
 use faer::Mat;
 
 /// Edges of the faces that a body is fitted with, at most, over the gap that its sources resolve.
-const LONG: f64 = 2.0;
+const LONG: f64 = 2.25;
 /// Most faces that it is divided into.
 const MOST: usize = 3200;
 

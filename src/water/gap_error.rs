@@ -69,6 +69,8 @@ pub(crate) struct Across {
     pub area: f64,
     /// The product of the edges that the faces there have on either side, m².
     pub edges: f64,
+    /// Estimated error of the added mass of either body alone, relative; 0 where nothing tells it.
+    pub own: f64,
     /// The gap, as far as the image behind a wall, over what compressed sources resolve.
     pub ratio: f64,
     /// Relative error that compression aims at.
@@ -137,6 +139,11 @@ impl Across {
         between(self.curvature / self.size, FLAT)
     }
 
+    /// Of the added mass of the bodies alone.
+    fn alone(&self) -> f64 {
+        self.own.max(OWN)
+    }
+
     /// What the larger body resolves, by faces or sources, over how far the middle of the smaller one is (x above); 0 where they are of like sizes.
     fn coarse(&self) -> f64 {
         let larger = between(self.expanse / self.size, LARGER);
@@ -157,7 +164,7 @@ impl Across {
         let force = (own + (1.0 - flat) * lost / (1.0 + lost) + flat * added).min(MOST);
         GapError {
             carried: Carried::Sources,
-            added_mass: OWN + self.tolerance + MASS * force,
+            added_mass: self.alone() + self.tolerance + MASS * force,
             force,
         }
     }
@@ -174,7 +181,7 @@ impl Across {
         let force = base + FACETS * (4.0 * self.inside(self.film_edge)).ln_1p();
         GapError {
             carried: Carried::Film,
-            added_mass: OWN + self.tolerance + (MASS + MASS_FLAT * flat) * force,
+            added_mass: self.alone() + self.tolerance + (MASS + MASS_FLAT * flat) * force,
             force,
         }
     }
@@ -237,7 +244,7 @@ impl Across {
             + flat * THIN * thin / (1.0 + thin);
         GapError {
             carried: Carried::Panels,
-            added_mass: OWN + (MASS + MASS_FLAT * flat) * force,
+            added_mass: self.alone() + (MASS + MASS_FLAT * flat) * force,
             force,
         }
     }

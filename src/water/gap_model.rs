@@ -23,6 +23,8 @@ pub(crate) struct GapModel {
     pub carried: Option<Carried>,
     /// Relative error that compression aims at, per body.
     pub tolerances: Vec<f64>,
+    /// Estimated errors of the bodies' own added mass, per body; 0 where nothing tells them.
+    pub own: Vec<f64>,
     /// All films that there may be, by the numbers of bodies in the water.
     pub films: Films,
     /// The bodies in the water, which ascend.
@@ -81,6 +83,10 @@ impl GapModel {
             size: clearance.size(gap),
             area,
             edges: edges.iter().product(),
+            own: gap
+                .sides()
+                .filter_map(|(b, _)| self.own.get(b))
+                .fold(0.0, |a, b| b.max(a)),
             expanse: clearance.expanse(gap),
             resolved,
             ratio: ratio.max(LEAST),

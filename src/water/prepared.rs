@@ -136,8 +136,9 @@ pub(crate) fn prepare(
             regions: d.resolved_regions.clone(),
         };
     }
-    let mut tolerances = vec![0.0; scene.bodies.len()];
+    let (mut tolerances, mut own) = (vec![0.0; scene.bodies.len()], vec![0.0; scene.bodies.len()]);
     for (k, (b, d)) in numbers.iter().zip(&made.bodies).enumerate() {
+        own[*b] = d.added_mass_error.unwrap_or(0.0);
         if fidelity.kind().compresses() {
             tolerances[*b] = tolerance(problem.chosen(k), d);
         }
@@ -145,6 +146,7 @@ pub(crate) fn prepare(
     let gap_model = GapModel {
         carried: made.carried.filter(|_| scene.fluid.density > 0.0),
         tolerances,
+        own,
         films: made.films,
         in_water: numbers.clone(),
         resolved,

@@ -207,8 +207,7 @@ pub(super) fn shape_slopes(
         }
         let method = problem.method_for(body)?;
         let units = InUnits::new(body, method, problem.chosen(b), problem.numerics)?;
-        let finer = finer::Halved::new(body, units.halved);
-        let (size, own) = (units.size, alone_slopes(problem, &finer.body(body), group)?);
+        let (size, own) = (units.size, alone_slopes(problem, body, group)?);
         let moving: Vec<_> = group
             .iter()
             .map(|(_, change)| move |p: &Vec3| units_velocity(change, size, p))

@@ -33,14 +33,14 @@ pub(super) fn halvings(method: &dyn BodyMethod, mesh: &TriMesh, gap: f64) -> usi
 }
 
 /// A body's meshes with their edges halved.
-pub(super) struct Halved {
+struct Halved {
     mesh: Option<TriMesh>,
     coarse: Option<Coarse>,
 }
 
 impl Halved {
     /// So many times.
-    pub fn new(body: &SubmergedBody, times: usize) -> Self {
+    fn new(body: &SubmergedBody, times: usize) -> Self {
         Self {
             mesh: body.mesh.map(|mesh| halved(mesh, times)),
             // What two meshes are extrapolated by is how far their edges are apart, which stays.
@@ -52,7 +52,7 @@ impl Halved {
     }
 
     /// The body with them.
-    pub fn body<'a>(&'a self, of: &SubmergedBody<'a>) -> SubmergedBody<'a> {
+    fn body<'a>(&'a self, of: &SubmergedBody<'a>) -> SubmergedBody<'a> {
         SubmergedBody {
             mesh: self.mesh.as_ref(),
             coarse: self.coarse.as_ref(),
@@ -62,30 +62,33 @@ impl Halved {
     }
 }
 
-/// The body alone, resolved for sources as near as `gap` (m), its edges halved `times` times.
+/// The body alone, resolved for sources as near as `gap` (m): its flow by faces whose edges are halved `times` times, its added mass by its own,
+/// as every fidelity has it, and what streams act on.
 pub(in crate::water) fn response(
     method: &dyn BodyMethod,
     body: &SubmergedBody,
     numerics: &Numerics,
     (gap, times): (f64, usize),
 ) -> Solved {
+    let own = method.response(body, numerics, gap)?;
     if times == 0 {
-        return method.response(body, numerics, gap);
+        return Ok(own);
     }
     let finer = Halved::new(body, times);
     let flow = method.response(&finer.body(body), numerics, gap)?;
-    Ok(Box::new(Finer { flow, times }))
+    Ok(Box::new(Finer { own, flow, times }))
 }
 
-/// By finer faces.
+/// A body's added mass by its own faces, and its flow by finer ones.
 struct Finer {
+    own: Box<dyn Response>,
     flow: Box<dyn Response>,
     times: usize,
 }
 
 impl Response for Finer {
     fn added_mass(&self) -> Mat6 {
-        self.flow.added_mass()
+        self.own.added_mass()
     }
 
     fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
@@ -97,7 +100,7 @@ impl Response for Finer {
     }
 
     fn asymmetry(&self) -> f64 {
-        self.flow.asymmetry()
+        self.own.asymmetry()
     }
 
     fn halved(&self) -> usize {
@@ -105,10 +108,10 @@ impl Response for Finer {
     }
 
     fn error(&self) -> Option<f64> {
-        self.flow.error()
+        self.own.error()
     }
 
     fn warnings(&self) -> &[String] {
-        self.flow.warnings()
+        self.own.warnings()
     }
 }

@@ -100,6 +100,8 @@ const ADDED_ABOVE: f64 = -4.0;
 const ADDED_AT: f64 = 7.0;
 /// Of the force, by bodies that are solved alone, however wide the gap is.
 const OWN: f64 = 0.005;
+/// The part of what two meshes tell of a body alone that counts: they are cautious.
+const CAUTIOUS: f64 = 0.15;
 /// Most that an estimate says.
 const MOST: f64 = 10.0;
 /// Of the force through a film between round and between flat surfaces.
@@ -141,7 +143,7 @@ impl Across {
 
     /// Of the added mass of the bodies alone.
     fn alone(&self) -> f64 {
-        self.own.max(OWN)
+        (CAUTIOUS * self.own).max(OWN)
     }
 
     /// What the larger body resolves, by faces or sources, over how far the middle of the smaller one is (x above); 0 where they are of like sizes.

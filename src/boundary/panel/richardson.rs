@@ -116,6 +116,8 @@ pub struct Extrapolated {
     fine: PanelBoundary,
     coarse: PanelBoundary,
     found: Richardson,
+    /// Of a twist what moves water: of one whose energy extrapolation leaves under zero, and so is none, the flow is none.
+    moves: Mat6,
 }
 
 impl Extrapolated {
@@ -125,8 +127,11 @@ impl Extrapolated {
     /// # Errors
     /// Meshes that don't differ enough.
     pub fn new(fine: PanelBoundary, coarse: PanelBoundary, ratio: Option<f64>) -> Result<Self> {
+        let found = Richardson::of(&fine, &coarse, ratio)?;
+        let raw = richardson_of_ratio(&fine, &coarse, found.ratio)?.added_mass;
         Ok(Self {
-            found: Richardson::of(&fine, &coarse, ratio)?,
+            moves: moving(&raw, fine.faces.volume()),
+            found,
             fine,
             coarse,
         })
@@ -155,6 +160,20 @@ fn positive(m: &Mat6, volume: f64, least: f64) -> Mat6 {
     eigen.recompose().component_mul(&units)
 }
 
+/// The part of a twist whose energies aren't negative, by the same measure as [`positive`].
+fn moving(m: &Mat6, volume: f64) -> Mat6 {
+    let units = displaced(volume);
+    let eigen = m.component_div(&units).symmetric_eigen();
+    if eigen.eigenvalues.min() >= 0.0 {
+        return Mat6::identity();
+    }
+    let kept = eigen.eigenvalues.map(|x| if x < 0.0 { 0.0 } else { 1.0 });
+    let vectors = eigen.eigenvectors;
+    let projection = vectors * Mat6::from_diagonal(&kept) * vectors.transpose();
+    let root = |i: usize| units[(i, i)].sqrt();
+    Mat6::from_fn(|i, j| projection[(i, j)] * root(j) / root(i))
+}
+
 /// Inertia of the water displaced, in mass and, roughly, in rotation: units of a 6 × 6 matrix.
 pub(super) fn displaced(volume: f64) -> Mat6 {
     let roots = Vec6::from_fn(|i, _| {
@@ -171,7 +190,9 @@ impl Response for Extrapolated {
 
     fn radiated(&self, points: &[Vec3]) -> Result<Mat<f64>> {
         let fine = self.fine.radiated(points)?;
-        Ok(self.extrapolate(fine, &self.coarse.radiated(points)?))
+        let both = self.extrapolate(fine, &self.coarse.radiated(points)?);
+        let moves = Mat::from_fn(6, 6, |i, j| self.moves[(i, j)]);
+        Ok(both * moves)
     }
 
     fn scattered(&self, sources: &[Vec3], points: &[Vec3]) -> Result<Mat<f64>> {

@@ -22,7 +22,7 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 const FORMAT: &str = concat!(
     "hydrograd-compressed-body ",
     env!("CARGO_PKG_VERSION"),
-    " 7"
+    " 8"
 );
 /// Bodies kept in memory.
 const MOST: usize = 256;

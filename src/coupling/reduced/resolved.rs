@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 const ILL_CONDITIONED: f64 = 1e4;
 
 /// Part of the water displaced that an energy may be below zero by: twists that move no water (a disc's
-/// spin) carry what the one-body method leaves of them, up to 1.5e-6 between cylinders of 80 faces that all but touch.
-const ROUNDING: f64 = 1e-5;
+/// spin) carry what the one-body method leaves of them.
+const ROUNDING: f64 = 1e-7;
 
 impl Reduced {
     /// Whether what one evaluation is solved with can be had: I − LᵀGL, and what the bodies of every pair that never fades see of each other.
